@@ -1,0 +1,1 @@
+"""What runs on the device; all of drpt that knows Dr.Jit."""

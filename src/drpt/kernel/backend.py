@@ -1,0 +1,165 @@
+"""Chooses Dr.Jit's backend, and the LLVM library before Dr.Jit loads one by itself.
+
+Importing this module does not import Dr.Jit. Whatever imports Dr.Jit or Mitsuba calls :func:`load`
+first; both then use the same LLVM.
+"""
+
+import ctypes
+import importlib
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from drpt.kernel import llvm
+from drpt.kernel.llvm import BackendError
+
+__all__ = ["Backend", "BackendError", "describe", "load", "set_thread_count"]
+
+VARIABLE = "DRPT_BACKEND"
+"""The environment variable that names a backend."""
+
+NAMES = ("llvm", "cuda")
+
+
+@dataclass(frozen=True)
+class Backend:
+    """What kernels are compiled and run with; LLVM's fields are None where there is none."""
+
+    name: str
+    llvm_path: Path | None
+    llvm_version: str | None
+    vector_width: int | None
+    threads: int
+    cuda: bool
+    cache: Path | None
+    cache_writable: bool
+
+
+def load(name: str | None = None) -> ModuleType:
+    """Return Dr.Jit's module of array types, ``drjit.llvm`` or ``drjit.cuda``.
+
+    Parameters
+    ----------
+    name
+        ``"llvm"`` or ``"cuda"``; by default what the environment variable ``DRPT_BACKEND`` says,
+        else CUDA where it works, else LLVM.
+
+    Raises
+    ------
+    ValueError
+        The name is neither of the two.
+    BackendError
+        The backend cannot work here; the message says what to do.
+    """
+    name = name or os.environ.get(VARIABLE) or None
+    if name not in (None, *NAMES):
+        raise ValueError(f"backend must be one of {', '.join(NAMES)}, got {name!r}")
+    if "drjit" not in sys.modules:
+        _name_library(optional=name != "llvm" and _has_cuda_driver())
+        _import_drjit()
+    name = name or ("cuda" if _works("CUDA") else "llvm")
+    if name == "cuda" and not _works("CUDA"):
+        raise BackendError("backend cuda needs an NVIDIA GPU and its driver, none was found")
+    if name == "llvm":
+        _check_loaded_llvm()
+    return importlib.import_module(f"drjit.{name}")
+
+
+def set_thread_count(count: int) -> None:
+    """Set the number of CPU threads that kernels run on."""
+    if count < 1:
+        raise ValueError(f"threads must be at least 1, got {count}")
+    import drjit as dr
+
+    dr.set_thread_count(count)
+
+
+def describe() -> Backend:
+    """Return what :func:`load` chose, loading the backend if that has not happened yet."""
+    name = load().__name__.removeprefix("drjit.")
+    import drjit as dr
+
+    has_llvm = _works("LLVM")
+    path = os.environ.get(llvm.VARIABLE)
+    cache = _cache_folder()
+    return Backend(
+        name=name,
+        llvm_path=Path(path) if has_llvm and path else None,
+        llvm_version=".".join(map(str, dr.detail.llvm_version())) if has_llvm else None,
+        vector_width=_vector_width() if has_llvm else None,
+        threads=dr.thread_count(),
+        cuda=_works("CUDA"),
+        cache=cache,
+        cache_writable=cache is not None and _writable(cache),
+    )
+
+
+def _name_library(*, optional: bool) -> None:
+    try:
+        library = llvm.choose(llvm.found(), os.environ.get(llvm.VARIABLE))
+    except BackendError:
+        if not optional:
+            raise
+    else:
+        os.environ[llvm.VARIABLE] = str(library.path)
+
+
+def _import_drjit() -> None:
+    try:
+        importlib.import_module("drjit")
+    except (ImportError, NameError) as error:  # the latter: Dr.Jit 1.5 fails to report the former
+        raise BackendError(
+            f"Dr.Jit cannot be imported, on Debian it needs libatomic1: {error.__context__ or error}"
+        ) from error
+
+
+def _works(name: str) -> bool:
+    import drjit as dr
+
+    return bool(dr.has_backend(getattr(dr.JitBackend, name)))
+
+
+def _check_loaded_llvm() -> None:
+    import drjit as dr
+
+    if not _works("LLVM"):
+        raise BackendError(
+            f"Dr.Jit could not load the LLVM library {os.environ.get(llvm.VARIABLE, '')}".rstrip()
+        )
+    version = dr.detail.llvm_version()
+    if version < llvm.OLDEST:
+        raise BackendError(
+            f"Dr.Jit was imported before drpt and took LLVM {'.'.join(map(str, version))}, "
+            f"too old: import drpt first, or set {llvm.VARIABLE}"
+        )
+
+
+def _has_cuda_driver() -> bool:
+    try:
+        ctypes.CDLL(os.environ.get("DRJIT_LIBCUDA_PATH") or "libcuda.so.1")
+    except OSError:
+        return False
+    return True
+
+
+def _vector_width() -> int:
+    """Return the lanes of a float vector; Dr.Jit tells them in C++ only."""
+    import drjit as dr
+
+    core = next(Path(dr.__file__).parent.glob("libdrjit-core.*"))
+    return int(ctypes.CDLL(str(core))["_Z21jit_llvm_vector_widthv"]())
+
+
+def _cache_folder() -> Path | None:
+    """Return where Dr.Jit keeps compiled kernels: it keeps none without a home folder."""
+    if folder := os.environ.get("DRJIT_CACHE_DIR"):
+        return Path(folder)
+    home = os.environ.get("HOME")
+    return Path(home) / ".drjit" if home else None
+
+
+def _writable(folder: Path) -> bool:
+    existing = next(place for place in (folder, *folder.parents) if place.exists())
+    return os.access(existing, os.W_OK | os.X_OK)

@@ -1,0 +1,114 @@
+"""A scene on the device: geometry as constants of the kernel, all that radiates as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import numpy as np
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from drjit.auto import Array3f, Array4f, Float, UInt32
+    from numpy.typing import NDArray
+
+    from drpt.kernel.facets import Facet
+    from drpt.kernel.primitives import Primitives
+
+
+@dataclass
+class Ball:
+    """A sphere whose centre and radius are inputs of the kernel, the same for all lanes."""
+
+    center: Array3f
+    radius: Float
+
+
+@dataclass
+class DeviceScene:
+    """Primitives as kernels see them; the numbers of primitives are those of `Primitives`.
+
+    Attributes
+    ----------
+    facets, blockers
+        Constants of each facet, and whether it can cast a shadow.
+    balls
+        Each sphere, if they are few.
+    geometry
+        Rows of 4 by primitive: (normal, offset) or (centre, radius).
+    reflectance
+        Rows of 4 by primitive: (albedo, exponent).
+    smooth
+        18 by smooth triangle: its corners, then the normals there.
+    radiance
+        Rows of 4 by light: (radiance, 1 / pmf).
+    light_area, light_cdf
+        By light.
+    light_corners
+        Rows of 9 by emitting triangle.
+    """
+
+    types: ModuleType
+    first_smooth: int
+    first_sphere: int
+    first_light: int
+    first_light_triangle: int
+    facets: tuple[Facet, ...]
+    blockers: tuple[bool, ...]
+    balls: tuple[Ball, ...]
+    geometry: Float
+    reflectance: Float
+    smooth: Float
+    radiance: Float
+    light_area: Float
+    light_cdf: Float
+    light_corners: Float
+    light_count: int
+    sphere_lights: int
+
+    def geometry_row(self, primitive: UInt32, active: Any = True) -> Array4f:
+        """Normal and offset, or centre and radius."""
+        return dr.gather(self.types.Array4f, self.geometry, primitive, active)
+
+    def radiance_row(self, light: UInt32, active: Any = True) -> Array4f:
+        """Radiance and 1 / pmf of a light."""
+        return dr.gather(self.types.Array4f, self.radiance, light, active)
+
+
+def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
+    """Put the primitives on the device, as arrays of the backend ``types``."""
+
+    def array(values: NDArray[np.float64]) -> Float:
+        return types.Float32(values.astype(np.float32).ravel())
+
+    pmf = primitives.light_pmf()
+    first = primitives.first_sphere
+    planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
+    return DeviceScene(
+        types=types,
+        first_smooth=primitives.first_smooth,
+        first_sphere=first,
+        first_light=primitives.first_light,
+        first_light_triangle=primitives.first_light_triangle,
+        facets=primitives.facets,
+        blockers=tuple(primitives.blockers()),
+        balls=tuple(_ball(row, types) for row in primitives.spheres),
+        geometry=array(np.concatenate([planes, primitives.spheres, lit_planes])),
+        reflectance=array(primitives.reflectance),
+        smooth=array(
+            np.concatenate([primitives.smooth_corners, primitives.smooth_normals], axis=1)
+        ),
+        radiance=array(np.column_stack([primitives.radiance, 1 / pmf])),
+        light_area=array(primitives.light_areas()),
+        light_cdf=array(np.cumsum(pmf)),
+        light_corners=array(primitives.light_corners),
+        light_count=len(pmf),
+        sphere_lights=primitives.sphere_lights,
+    )
+
+
+def _ball(row: NDArray[np.float64], types: ModuleType) -> Ball:
+    x, y, z, radius = (dr.opaque(types.Float32, float(value)) for value in row)
+    return Ball(types.Array3f(x, y, z), radius)

@@ -1,0 +1,171 @@
+"""Lights as seen from a point: a sample of one, and the density with which it would be found."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import drjit as dr
+
+from drpt.kernel.vec import frame, vec3
+from drpt.kernel.warp import TWO_PI, square_to_cone, square_to_sphere, square_to_triangle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from drjit.auto import Array2f, Array3f, Float, UInt32
+
+    from drpt.kernel.camera import Ray
+    from drpt.kernel.device_scene import DeviceScene
+    from drpt.kernel.estimator import Features, Mode
+    from drpt.kernel.intersect import Hit
+
+
+class Aim(NamedTuple):
+    """A direction to a light, the distance to it, and 1 / density per solid angle; 0 if unlit."""
+
+    direction: Array3f
+    distance: Float
+    inverse_pdf: Float
+
+
+class LightSample(NamedTuple):
+    """A light chosen by its power and a direction to it; ``inverse_pdf`` is that of both."""
+
+    light: UInt32
+    direction: Array3f
+    distance: Float
+    radiance: Array3f
+    inverse_pdf: Float
+
+
+def choose_light(scene: DeviceScene, features: Features, u: Any) -> UInt32:
+    """Discrete: a light, with the probability of its power; ``u()`` is asked for if need be."""
+    if not features.light_choice:
+        return scene.types.UInt32(0)
+    value = u()
+    return dr.binary_search(
+        0, scene.light_count - 1, lambda i: dr.gather(type(value), scene.light_cdf, i) <= value
+    )
+
+
+def sample_light(
+    scene: DeviceScene, features: Features, mode: Mode, point: Array3f, light: UInt32, u: Array2f
+) -> LightSample:
+    """Solid angle: a direction from ``point`` to a chosen light."""
+    row = scene.radiance_row(light)
+    aim = _by_kind(
+        scene,
+        features,
+        light,
+        lambda: _aim_at_sphere(scene, mode, point, light, u),
+        lambda: _aim_at_triangle(scene, point, light, u),
+    )
+    return LightSample(
+        light, aim.direction, aim.distance, vec3(row[0], row[1], row[2]), aim.inverse_pdf * row[3]
+    )
+
+
+def inverse_pdf(
+    scene: DeviceScene, features: Features, ray: Ray, light: UInt32, hit: Hit
+) -> Float:
+    """1 / density with which :func:`sample_light`, sampling cones, finds a ray that hits a light."""
+    return scene.radiance_row(light)[3] * _by_kind(
+        scene,
+        features,
+        light,
+        lambda: TWO_PI * _cap(scene, ray.origin, light).height,
+        lambda: _area(scene, light)
+        * -dr.dot(hit.normal, ray.direction)
+        / dr.square(hit.distance),
+    )
+
+
+def _by_kind(
+    scene: DeviceScene,
+    features: Features,
+    light: UInt32,
+    sphere: Callable[[], Any],
+    triangle: Callable[[], Any],
+) -> Any:
+    """What the light's kind asks for; the kernel has no code for a kind that is missing."""
+    if not features.triangle_lights:
+        return sphere()
+    if not features.sphere_lights:
+        return triangle()
+    return dr.select(light < scene.sphere_lights, sphere(), triangle())
+
+
+class _Cap(NamedTuple):
+    """The part of a sphere light that a point sees: axis, distance, radius and cap height.
+
+    The height is 1 − cos θ_max on the unit sphere of directions, 0 from inside, where the light
+    is dark.
+    """
+
+    axis: Array3f
+    distance: Float
+    radius: Float
+    height: Float
+
+
+def _cap(scene: DeviceScene, point: Array3f, light: UInt32) -> _Cap:
+    row = scene.geometry_row(scene.first_light + light)
+    to_center = vec3(row[0], row[1], row[2]) - point
+    radius = row[3]
+    distance = dr.norm(to_center)
+    sine = radius / distance
+    cosine = dr.sqrt((distance - radius) * (distance + radius)) / distance
+    height = dr.select(distance > radius, sine * sine / (1 + cosine), 0)
+    return _Cap(to_center / distance, distance, radius, height)
+
+
+def _aim_at_sphere(
+    scene: DeviceScene, mode: Mode, point: Array3f, light: UInt32, u: Array2f
+) -> Aim:
+    if mode.samples_cones:
+        return _aim_into_cone(_cap(scene, point, light), u)
+    row = scene.geometry_row(scene.first_light + light)
+    normal = square_to_sphere(u)
+    radius = row[3]
+    target = dr.fma(normal, radius, vec3(row[0], row[1], row[2]))
+    return _aim_at_point(point, target, normal, _area(scene, light))
+
+
+def _aim_into_cone(cap: _Cap, u: Array2f) -> Aim:
+    local = square_to_cone(u, cap.height)
+    side = cap.distance * dr.sqrt(dr.square(local.x) + dr.square(local.y))
+    depth = dr.sqrt(dr.maximum((cap.radius - side) * (cap.radius + side), 0))
+    distance = cap.distance * local.z - depth
+    return Aim(frame(cap.axis).to_world(local), distance, TWO_PI * cap.height)
+
+
+def _aim_at_triangle(scene: DeviceScene, point: Array3f, light: UInt32, u: Array2f) -> Aim:
+    index = light - scene.sphere_lights
+    a, b, c = (
+        dr.gather(scene.types.Array3f, scene.light_corners, 3 * index + k) for k in range(3)
+    )
+    weights = square_to_triangle(u)
+    target = a + weights.x * (b - a) + weights.y * (c - a)
+    row = scene.geometry_row(scene.first_light + light)
+    return _aim_at_point(point, target, vec3(row[0], row[1], row[2]), _area(scene, light))
+
+
+def _aim_at_point(point: Array3f, target: Array3f, normal: Array3f, area: Float) -> Aim:
+    """Aim at a point that is uniform on an area; only its front, where its normal is, emits."""
+    way = target - point
+    distance = dr.norm(way)
+    direction = way / distance
+    cosine = dr.maximum(-dr.dot(direction, normal), 0)
+    return Aim(direction, distance, area * cosine / dr.square(distance))
+
+
+def _area(scene: DeviceScene, light: UInt32) -> Float:
+    return dr.gather(scene.types.Float32, scene.light_area, light)
+
+
+def power_heuristic(ratio: Float) -> Float:
+    """Weight of a sample whose density is 1 / ``ratio`` times that of the other technique.
+
+    Source: Veach & Guibas 1995, exponent 2, in the form that holds for ratios of 0 and infinity.
+    """
+    return dr.rcp(1 + dr.square(ratio))

@@ -1,0 +1,124 @@
+"""The path tracer.
+
+A path x₀ x₁ x₂ … starts at the camera's eye x₀. With ω the direction that leads on at a vertex and
+p its density, the throughput after vertex i is
+
+    beta_i = ∏_{j ≤ i} f(x_j, ω_j) cos θ_j / p(ω_j),
+
+and the estimate of the radiance along the first ray is, over the vertices i = 1 … bounces + 1 and
+bounces,
+
+    implicit    L = Σ_i  beta_{i−1} L_e(x_i)
+    explicit    L = L_e(x₁) + Σ_i  beta_{i−1} f(x_i, ω') cos θ' L_e(ω') V(ω') / p_light(ω')
+    mis         both sums, each term weighted by the power heuristic of p_light and p_brdf.
+
+(Kajiya 1986; Veach 1997, ch. 8–10.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import drjit as dr
+
+from drpt.kernel.brdf import Brdf, make_brdf
+from drpt.kernel.camera import Ray
+from drpt.kernel.intersect import Hit, closest_hit, occluded
+from drpt.kernel.light import choose_light, inverse_pdf, power_heuristic, sample_light
+from drpt.kernel.vec import vec3
+from drpt.kernel.warp import sphere_pdf, square_to_sphere
+
+if TYPE_CHECKING:
+    from drjit.auto import Array3f, Bool, Float, UInt32
+
+    from drpt.kernel.device_scene import DeviceScene
+    from drpt.kernel.estimator import Features, Mode
+    from drpt.kernel.sampler import Sampler
+
+
+@dataclass
+class Tracer:
+    """A path tracer for one scene and one estimator."""
+
+    scene: DeviceScene
+    features: Features
+    mode: Mode
+    bounces: int
+
+    def trace(self, ray: Ray, sampler: Sampler) -> tuple[Array3f, UInt32]:
+        """Radiance (W/(m² sr), three channels) along camera rays, and how many rays it took."""
+        scene, features, mode = self.scene, self.features, self.mode
+        types = scene.types
+        radiance = types.Array3f(0)  # collected so far
+        rays = types.UInt32(0)  # traced so far
+        beta = types.Array3f(1)  # throughput up to the current vertex
+        pdf = None  # density of the ray by the BRDF, for MIS
+        active = types.Bool(True)
+        for depth in range(self.bounces + 1 if features.emission else 0):
+            rays += dr.select(active, 1, 0)
+            hit = closest_hit(scene, features, ray, active)
+            if depth == 0 or mode.counts_hits:
+                radiance += beta * self._emission(ray, hit, pdf)
+            if depth == self.bounces:
+                break
+            active = hit.valid & (hit.primitive < scene.first_light)
+            hit.valid = active
+            brdf = make_brdf(scene, features, hit, -ray.direction)
+            if features.direct_light:
+                light, traced = self._direct(hit, brdf, sampler, depth)
+                radiance += beta * light
+                rays += dr.select(traced, 1, 0)
+            if depth == self.bounces - 1 and not mode.counts_hits:
+                break
+            direction, weight = self._next_direction(brdf, sampler, depth)
+            if features.mis:
+                pdf = brdf.pdf(direction)
+            ray = Ray(hit.point, direction)
+            beta = beta * weight
+            active &= dr.max(beta) > 0
+        return radiance, rays
+
+    def _emission(self, ray: Ray, hit: Hit, pdf: Float | None) -> Array3f:
+        """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
+        scene = self.scene
+        lit = hit.valid & (hit.primitive >= scene.first_light) & hit.front
+        light = scene.types.UInt32(0)
+        if scene.light_count > 1:
+            light = dr.select(lit, hit.primitive - scene.first_light, 0)
+        row = scene.radiance_row(light)
+        radiance = dr.select(lit, vec3(row[0], row[1], row[2]), 0)
+        if pdf is None:
+            return radiance
+        density = 1 / inverse_pdf(scene, self.features, ray, light, hit)
+        return radiance * power_heuristic(density / pdf)
+
+    def _direct(
+        self, hit: Hit, brdf: Brdf, sampler: Sampler, depth: int
+    ) -> tuple[Array3f, Bool]:
+        """Direct light by one sample of one light, and where that took a shadow ray."""
+        scene, features = self.scene, self.features
+        light = choose_light(scene, features, lambda: sampler.next_1d(_decision(depth, 0)))
+        u = sampler.next_2d(_decision(depth, 1))
+        sample = sample_light(scene, features, self.mode, hit.point, light, u)
+        value = brdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
+        if features.mis:
+            value *= power_heuristic(brdf.pdf(sample.direction) * sample.inverse_pdf)
+        traced = hit.valid & (dr.max(value) > 0)
+        shadow = occluded(scene, Ray(hit.point, sample.direction), sample.distance, light)
+        return dr.select(traced & ~shadow, value, 0), traced
+
+    def _next_direction(
+        self, brdf: Brdf, sampler: Sampler, depth: int
+    ) -> tuple[Array3f, Array3f]:
+        """The direction in which a path goes on, and its weight f cos θ / p."""
+        u = sampler.next_2d(_decision(depth, 2))
+        if self.mode.samples_brdf:
+            return brdf.sample(u)
+        direction = square_to_sphere(u)
+        return direction, brdf.eval(direction) / sphere_pdf()
+
+
+def _decision(depth: int, kind: int) -> int:
+    """Number of a vertex' decision: light (0), point on it (1), next direction (2)."""
+    return 1 + 3 * depth + kind
