@@ -86,7 +86,7 @@ def describe() -> Backend:
     cache = _cache_folder()
     return Backend(
         name=name,
-        llvm_path=Path(path) if has_llvm and path else None,
+        llvm_path=Path(path).resolve() if has_llvm and path else None,
         llvm_version=".".join(map(str, dr.detail.llvm_version())) if has_llvm else None,
         vector_width=_vector_width() if has_llvm else None,
         threads=dr.thread_count(),
@@ -111,7 +111,7 @@ def _import_drjit() -> None:
         importlib.import_module("drjit")
     except (ImportError, NameError) as error:  # the latter: Dr.Jit 1.5 fails to report the former
         raise BackendError(
-            f"Dr.Jit cannot be imported, on Debian it needs libatomic1: {error.__context__ or error}"
+            f"Dr.Jit cannot be imported ({error.__context__ or error}); it needs libatomic1"
         ) from error
 
 
@@ -125,9 +125,7 @@ def _check_loaded_llvm() -> None:
     import drjit as dr
 
     if not _works("LLVM"):
-        raise BackendError(
-            f"Dr.Jit could not load the LLVM library {os.environ.get(llvm.VARIABLE, '')}".rstrip()
-        )
+        raise BackendError(f"Dr.Jit could not load LLVM from {os.environ.get(llvm.VARIABLE)}")
     version = dr.detail.llvm_version()
     if version < llvm.OLDEST:
         raise BackendError(

@@ -53,12 +53,14 @@ def sample_light(
 ) -> LightSample:
     """Solid angle: a direction from ``point`` to a chosen light."""
     row = scene.radiance_row(light)
-    aim = _by_kind(
-        scene,
-        features,
-        light,
-        lambda: _aim_at_sphere(scene, mode, point, light, u),
-        lambda: _aim_at_triangle(scene, point, light, u),
+    aim = Aim(
+        *_by_kind(
+            scene,
+            features,
+            light,
+            lambda: tuple(_aim_at_sphere(scene, mode, point, light, u)),
+            lambda: tuple(_aim_at_triangle(scene, point, light, u)),
+        )
     )
     return LightSample(
         light, aim.direction, aim.distance, vec3(row[0], row[1], row[2]), aim.inverse_pdf * row[3]

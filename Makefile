@@ -1,0 +1,35 @@
+# Every target first makes the environment .venv; see tools/setup.sh. Once made, that costs nothing.
+BIN := .venv/bin
+STAMP := .venv/.stamp
+
+.PHONY: demo test test-quick lint format lock clean
+
+demo: $(STAMP)  ## render the Cornell box
+	@mkdir -p out
+	@$(BIN)/drpt-render cornell-box --spp 256 --bounces 2 --mode explicit \
+		-o out/cornell-box.exr -o out/cornell-box.png
+
+test: $(STAMP)  ## every test
+	$(BIN)/python -m pytest
+
+test-quick: $(STAMP)  ## the tests that take no more than a few seconds
+	$(BIN)/python -m pytest -m "not slow"
+
+lint: $(STAMP)  ## what CI checks before the tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(STAMP)  ## let ruff write the code's format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock:  ## take the newest versions that pyproject.toml allows
+	@tools/lock.sh
+
+clean:  ## remove everything that was made here
+	rm -rf .venv out dist build .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(STAMP): pyproject.toml constraints.txt tools/setup.sh
+	@tools/setup.sh

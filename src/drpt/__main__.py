@@ -1,0 +1,7 @@
+"""`python -m drpt` is `drpt`."""
+
+import sys
+
+from drpt.cli import main
+
+sys.exit(main())

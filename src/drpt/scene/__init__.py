@@ -1,0 +1,31 @@
+"""Scenes on the host: the model, its files, and the built-in scenes."""
+
+from drpt.scene.builtin import builtin_names
+from drpt.scene.checks import SceneError
+from drpt.scene.files import load_scene
+from drpt.scene.model import (
+    Camera,
+    Diffuse,
+    Material,
+    Mesh,
+    Phong,
+    Scene,
+    Shape,
+    Sphere,
+    material_from_brdf_params,
+)
+
+__all__ = [
+    "Camera",
+    "Diffuse",
+    "Material",
+    "Mesh",
+    "Phong",
+    "Scene",
+    "SceneError",
+    "Shape",
+    "Sphere",
+    "builtin_names",
+    "load_scene",
+    "material_from_brdf_params",
+]

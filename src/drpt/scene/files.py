@@ -1,0 +1,193 @@
+"""Reading scene files: TOML text with a camera, materials and shapes.
+
+A value that a file gives goes to the model as it is, and the model checks it; what is checked
+here is which keys there are. Errors name the file and the path of the field in it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drpt.scene import checks
+from drpt.scene.builtin import builtin_names, builtin_path
+from drpt.scene.checks import SceneError
+from drpt.scene.model import Camera, Diffuse, Material, Mesh, Phong, Scene, Shape, Sphere
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+    from os import PathLike
+
+Table = dict[str, Any]
+"""A TOML table."""
+
+MATERIALS: dict[str, type[Material]] = {"diffuse": Diffuse, "phong": Phong}
+SURFACE = ("material", "radiance")
+
+
+def load_scene(name_or_path: str | PathLike[str]) -> Scene:
+    """Read a built-in scene by its name, or a scene file by its path.
+
+    Raises `SceneError`, one line that names the file and the field, if there is no such scene or
+    if something in it is missing, unknown or not allowed.
+    """
+    path = _find(name_or_path)
+    try:
+        return _scene(_read_toml(path), path.parent)
+    except SceneError as error:
+        raise error.in_file(str(path)) from None
+
+
+def _find(name_or_path: str | PathLike[str]) -> Path:
+    """Return the path of a scene; a name that is not built in needs a suffix or a folder."""
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise checks.refuse("", name_or_path, "the name of a built-in scene or a path")
+    name, path = str(name_or_path), Path(name_or_path)
+    if isinstance(name_or_path, os.PathLike) or path.suffix or name != path.name:
+        return path
+    if found := builtin_path(name):
+        return found
+    if path.exists():
+        return path
+    raise _unknown("", "scene", name, builtin_names(), "or the path of a scene file")
+
+
+def _read_toml(path: Path) -> Table:
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise SceneError("there is no such file") from None
+    except OSError as error:
+        raise SceneError(f"it cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"it is not TOML: byte {error.start} is not UTF-8") from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"it is not TOML: {error}") from None
+
+
+def _scene(scene: Table, folder: Path) -> Scene:
+    _check_keys(scene, required=("camera", "shapes"), optional=("description", "materials"))
+    with _within("camera"):
+        camera = _camera(scene["camera"])
+    with _within("materials"):
+        materials = _materials(scene.get("materials", {}))
+    if not isinstance(scene["shapes"], list):
+        raise checks.refuse("shapes", scene["shapes"], "an array of tables, [[shapes]]")
+    shapes = []
+    for index, shape in enumerate(scene["shapes"]):
+        with _within(f"shapes[{index}]"):
+            shapes.append(_shape(shape, materials, folder))
+    return Scene(camera, shapes, scene.get("description", ""))
+
+
+def _camera(value: object) -> Camera:
+    camera = _table(value)
+    _check_keys(camera, required=_field_names(Camera))
+    return Camera(**camera)
+
+
+def _materials(value: object) -> dict[str, Material]:
+    materials = {}
+    for name, material in _table(value).items():
+        with _within(name):
+            materials[name] = _material(material)
+    return materials
+
+
+def _material(value: object) -> Material:
+    name, parameters = _split_type(value, MATERIALS)
+    make = MATERIALS[name]
+    _check_keys(parameters, required=_field_names(make))
+    return make(**parameters)
+
+
+def _shape(value: object, materials: dict[str, Material], folder: Path) -> Shape:
+    kind, parameters = _split_type(value, ("sphere", "mesh"))
+    if "material" in parameters:
+        with _within("material"):
+            parameters["material"] = _shape_material(parameters["material"], materials)
+    if kind == "sphere":
+        _check_keys(parameters, required=("center", "radius"), optional=SURFACE)
+        return Sphere(**parameters)
+    if "file" in parameters:
+        _check_keys(parameters, required=("file",), optional=SURFACE)
+        return _mesh_from_file(folder, **parameters)
+    _check_keys(parameters, ("vertices", "faces"), ("normals", "file", *SURFACE))
+    return Mesh(**parameters)
+
+
+def _shape_material(value: object, materials: dict[str, Material]) -> Material:
+    """Return the material of a shape, given by its name or as a table."""
+    if not isinstance(value, str):
+        return _material(value)
+    if value not in materials:
+        raise _unknown("", "material", value, materials, "or a table with type, albedo, ...")
+    return materials[value]
+
+
+def _mesh_from_file(folder: Path, file: object, **surface: Any) -> Mesh:
+    if not isinstance(file, str):
+        raise checks.refuse("file", file, "the path of a mesh, relative to the scene file")
+    try:
+        return Mesh.load(folder / file, **surface)
+    except SceneError as error:
+        raise (SceneError(str(error), "file") if error.source else error) from None
+
+
+def _table(value: object) -> Table:
+    if not isinstance(value, dict):
+        raise checks.refuse("", value, "a table")
+    return dict(value)
+
+
+def _split_type(value: object, types: Collection[str]) -> tuple[str, Table]:
+    """Return the key ``type`` of a table, one of `types`, and its other keys."""
+    others = _table(value)
+    if "type" not in others:
+        raise SceneError(f"this key is missing; it must be one of {_list(types)}", "type")
+    name = others.pop("type")
+    if not isinstance(name, str) or name not in types:
+        raise _unknown("type", "type", name, types)
+    return name, others
+
+
+def _check_keys(table: Table, required: Collection[str], optional: Collection[str] = ()) -> None:
+    known = (*required, *optional)
+    for key in table:
+        if key not in known:
+            raise _unknown(key, "key", key, known)
+    for key in required:
+        if key not in table:
+            raise SceneError("this key is missing", key)
+
+
+def _unknown(
+    field: str, what: str, value: object, known: Collection[str], otherwise: str = ""
+) -> SceneError:
+    """Return the error that `value` is not one of the `known`, with the closest of them."""
+    close = difflib.get_close_matches(str(value), known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    allowed = " ".join(filter(None, (f"one of {_list(known)}", otherwise)))
+    return SceneError(f"there is no {what} {value!r}{hint}; it must be {allowed}", field)
+
+
+def _list(names: Collection[str]) -> str:
+    return ", ".join(names)
+
+
+def _field_names(model: type[Camera | Material]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(model))
+
+
+@contextmanager
+def _within(field: str) -> Iterator[None]:
+    """Put `field` before the field that an error names."""
+    try:
+        yield
+    except SceneError as error:
+        raise error.within(field) from None

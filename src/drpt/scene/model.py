@@ -1,0 +1,364 @@
+"""What a scene is: a camera and shapes, each with a material or a radiance.
+
+Everything here is immutable and checked when it is made; what is wrong raises `SceneError`.
+Lengths have no unit of their own, colours are linear RGB.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from drpt.scene import checks
+from drpt.scene.checks import RGB, Point, SceneError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from os import PathLike
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Colour: TypeAlias = float | Sequence[float] | NDArray[Any]
+    Vector: TypeAlias = Sequence[float] | NDArray[Any]
+
+MIN_SINE = 1e-6
+"""Smallest sine of the angle between a camera's up and its view direction."""
+UNIT_TOLERANCE = 1e-14
+"""Normals this close to unit length, some float64 roundings, are kept to the bit."""
+
+
+@dataclass(frozen=True, init=False)
+class Camera:
+    """A pinhole camera; image right is forward × up, row 0 is the top.
+
+    Parameters
+    ----------
+    eye, target
+        Where it stands, and the point in the middle of the picture.
+    up
+        The direction that points up in the picture; not parallel to the view direction.
+    fov
+        Vertical field of view in degrees, > 0 and < 180.
+    width, height
+        Size of the picture in pixels.
+    """
+
+    eye: Point
+    target: Point
+    up: Point
+    fov: float
+    width: int
+    height: int
+
+    def __init__(  # noqa: PLR0913, PLR0917 - a camera has six parameters
+        self, eye: Vector, target: Vector, up: Vector, fov: float, width: int, height: int
+    ) -> None:
+        _set(
+            self,
+            eye=checks.point("eye", eye),
+            target=checks.point("target", target),
+            up=checks.point("up", up),
+            fov=checks.number("fov", fov, checks.FOV),
+            width=checks.pixels("width", width),
+            height=checks.pixels("height", height),
+        )
+        self._check_frame()
+
+    def _check_frame(self) -> None:
+        view, up = np.subtract(self.target, self.eye), np.array(self.up)
+        distance, length = np.linalg.norm(view), np.linalg.norm(up)
+        if distance < checks.MIN_LENGTH:
+            words = f"a point at least {checks.plain(checks.MIN_LENGTH)} away from eye {self.eye}"
+            raise checks.refuse("target", self.target, words)
+        if length < checks.MIN_LENGTH:
+            words = f"a direction, of length {checks.plain(checks.MIN_LENGTH)} or more"
+            raise checks.refuse("up", self.up, words)
+        if np.linalg.norm(np.cross(view / distance, up / length)) < MIN_SINE:
+            words = f"a direction that is not parallel to the view {tuple(view.tolist())}"
+            raise checks.refuse("up", self.up, words)
+
+
+@dataclass(frozen=True, init=False)
+class Diffuse:
+    """A Lambertian surface, f = albedo / π.
+
+    Parameters
+    ----------
+    albedo
+        From 0 to 1; three values, or one for grey.
+    """
+
+    albedo: RGB
+
+    def __init__(self, albedo: Colour) -> None:
+        _set(self, albedo=checks.colour("albedo", albedo, checks.ALBEDO))
+
+
+@dataclass(frozen=True, init=False)
+class Phong:
+    """A glossy surface, f = albedo (exponent + 1) / (2π) max(0, ω_r·ω_i)^exponent.
+
+    Here ω_r is the view direction mirrored at the shading normal (Lafortune and Willems 1994;
+    their specular part alone, with exponent + 1 in place of exponent + 2).
+
+    Parameters
+    ----------
+    albedo
+        From 0 to 1; three values, or one for grey.
+    exponent
+        From 0 to 1e8; the higher, the sharper the reflection.
+    """
+
+    albedo: RGB
+    exponent: float
+
+    def __init__(self, albedo: Colour, exponent: float) -> None:
+        _set(
+            self,
+            albedo=checks.colour("albedo", albedo, checks.ALBEDO),
+            exponent=checks.number("exponent", exponent, checks.EXPONENT),
+        )
+
+
+Material: TypeAlias = Diffuse | Phong
+
+
+class _Surface:
+    """What every shape has: a material or a radiance, never both."""
+
+    material: Material | None
+    radiance: RGB | None
+
+    @property
+    def is_light(self) -> bool:
+        """Whether it emits; a radiance of 0 makes a black surface instead."""
+        return self.radiance is not None and any(self.radiance)
+
+    def _set_surface(self, material: Material | None, radiance: Colour | None) -> None:
+        if material is None and radiance is None:
+            raise SceneError("it has neither a material nor a radiance; give it one of them")
+        if material is not None and radiance is not None:
+            raise SceneError("it has both a material and a radiance; give it only one of them")
+        if not isinstance(material, Material | None):
+            raise checks.refuse("material", material, "a Diffuse or a Phong")
+        if radiance is not None:
+            radiance = checks.colour("radiance", radiance, checks.RADIANCE)
+        _set(self, material=material, radiance=radiance)
+
+
+@dataclass(frozen=True, init=False)
+class Sphere(_Surface):
+    """A sphere, with a material or, as a light, a radiance.
+
+    Parameters
+    ----------
+    center, radius
+        Its centre, and its radius > 0.
+    material
+        How it reflects, on both sides.
+    radiance
+        What it emits outward, W/(m² sr) or relative; three values, or one for grey. A light
+        reflects nothing; with radiance 0 it is black.
+    """
+
+    center: Point
+    radius: float
+    material: Material | None
+    radiance: RGB | None
+
+    def __init__(
+        self,
+        center: Vector,
+        radius: float,
+        material: Material | None = None,
+        radiance: Colour | None = None,
+    ) -> None:
+        _set(
+            self,
+            center=checks.point("center", center),
+            radius=checks.number("radius", radius, checks.RADIUS),
+        )
+        self._set_surface(material, radiance)
+
+
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Mesh(_Surface):
+    """A triangle mesh, with a material or, as a light, a radiance.
+
+    A triangle's front is where its vertices are seen counter-clockwise. A triangle without area
+    is never hit. The arrays are copied, and read-only.
+
+    Parameters
+    ----------
+    vertices
+        Positions, shape (n, 3).
+    faces
+        Indices of each triangle's vertices, whole numbers of shape (m, 3).
+    normals
+        Shading normals of the vertices, shape (n, 3), none of length 0; stored with length 1.
+        Without them every triangle is flat.
+    material
+        How it reflects, on both sides.
+    radiance
+        What its front emits, W/(m² sr) or relative; three values, or one for grey. A light
+        reflects nothing; with radiance 0 it is black.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    normals: NDArray[np.float64] | None
+    material: Material | None
+    radiance: RGB | None
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        normals: ArrayLike | None = None,
+        material: Material | None = None,
+        radiance: Colour | None = None,
+    ) -> None:
+        points = checks.vectors("vertices", vertices)
+        _set(
+            self,
+            vertices=points,
+            faces=checks.indices("faces", faces, len(points)),
+            normals=None if normals is None else _unit_normals(normals, len(points)),
+        )
+        self._set_surface(material, radiance)
+        if self.is_light and self.areas().sum() < checks.MIN_LENGTH**2:
+            raise SceneError("they have no area; a light must have one", "faces")
+
+    @classmethod
+    def load(
+        cls,
+        path: str | PathLike[str],
+        material: Material | None = None,
+        radiance: Colour | None = None,
+    ) -> Mesh:
+        """Read a mesh from an OBJ, PLY or NPZ file (arrays ``v``, ``f`` and, optional, ``vn``).
+
+        Normals are used where the file has them, and never made up. Raises `SceneError` if the
+        file cannot be read or what it holds is not allowed.
+        """
+        from drpt.scene.meshes import load_mesh
+
+        vertices, faces, normals = load_mesh(path)
+        try:
+            black = cls(vertices, faces, normals, radiance=0)
+        except SceneError as error:
+            raise error.in_file(str(path)) from None
+        return cls(black.vertices, black.faces, black.normals, material, radiance)
+
+    def areas(self) -> NDArray[np.float64]:
+        """Return the area of each triangle, shape (m,)."""
+        a, b, c = self.vertices[self.faces].swapaxes(0, 1)
+        areas: NDArray[np.float64] = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+        return areas
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Mesh):
+            return NotImplemented
+        return (
+            (self.material, self.radiance) == (other.material, other.radiance)
+            and np.array_equal(self.vertices, other.vertices)
+            and np.array_equal(self.faces, other.faces)
+            and _equal_normals(self.normals, other.normals)
+        )
+
+    def __hash__(self) -> int:
+        return hash((len(self.vertices), len(self.faces), self.material, self.radiance))
+
+    def __repr__(self) -> str:
+        normals = "" if self.normals is None else "with normals, "
+        surface = f"radiance={self.radiance}" if self.material is None else f"{self.material}"
+        return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces, {normals}{surface})"
+
+
+Shape: TypeAlias = Sphere | Mesh
+
+
+@dataclass(frozen=True, init=False)
+class Scene:
+    """A camera and the shapes that it sees.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+    shapes
+        Spheres and meshes, one at least.
+    description
+        One line for people.
+    """
+
+    camera: Camera
+    shapes: tuple[Shape, ...]
+    description: str
+
+    def __init__(self, camera: Camera, shapes: Iterable[Shape], description: str = "") -> None:
+        if not isinstance(camera, Camera):
+            raise checks.refuse("camera", camera, "a Camera")
+        if not isinstance(description, str):
+            raise checks.refuse("description", description, "a text")
+        _set(self, camera=camera, shapes=_shapes(shapes), description=description)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a TOML scene file, and its meshes into a folder beside it.
+
+        Reading it again gives an equal scene. Raises `SceneError` if it cannot be written.
+        """
+        from drpt.scene.saving import save_scene
+
+        save_scene(self, path)
+
+
+def material_from_brdf_params(brdf_params: Vector) -> Material:
+    """Return the material of the vector (red, green, blue, α): diffuse if α is 1, else Phong.
+
+    The first three are the albedo, from 0 to 1; α is the Phong exponent.
+    """
+    if not isinstance(brdf_params, list | tuple | np.ndarray) or len(brdf_params) != 4:
+        words = "four numbers: red, green, blue, exponent"
+        raise checks.refuse("brdf_params", brdf_params, words)
+    *albedo, exponent = brdf_params
+    return Diffuse(albedo) if exponent == 1 else Phong(albedo, exponent)
+
+
+def _set(instance: object, **values: object) -> None:
+    """Fill the fields of a frozen dataclass while it is made."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
+
+
+def _unit_normals(normals: ArrayLike, count: int) -> NDArray[np.float64]:
+    vectors = checks.vectors("normals", normals)
+    if len(vectors) != count:
+        raise SceneError(f"there are {len(vectors)}, but {count} vertices", "normals")
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    if not lengths.all():
+        row = int(np.flatnonzero(lengths == 0)[0])
+        raise checks.refuse(f"normals[{row}]", tuple(vectors[row].tolist()), "longer than 0")
+    unit = np.where(np.abs(lengths - 1) < UNIT_TOLERANCE, vectors, vectors / lengths)
+    return checks.read_only(unit)
+
+
+def _equal_normals(first: NDArray[np.float64] | None, second: NDArray[np.float64] | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return np.array_equal(first, second)
+
+
+def _shapes(shapes: Iterable[Shape]) -> tuple[Shape, ...]:
+    try:
+        items = tuple(shapes)
+    except TypeError:
+        raise checks.refuse("shapes", shapes, "a list of Sphere and Mesh") from None
+    if not items:
+        raise SceneError("there are none; a scene needs one shape at least", "shapes")
+    for index, item in enumerate(items):
+        if not isinstance(item, Shape):
+            raise checks.refuse(f"shapes[{index}]", item, "a Sphere or a Mesh")
+    return items

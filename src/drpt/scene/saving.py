@@ -1,0 +1,124 @@
+"""Writing scenes: as a TOML scene file with its meshes beside it, or as one text."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drpt.scene.checks import SceneError
+from drpt.scene.model import Diffuse, Material, Mesh, Scene, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from os import PathLike
+
+Table = dict[str, Any]
+"""A TOML table."""
+
+MAX_INLINE_VERTICES = 1000
+"""Vertices of a scene up to which `to_toml` spells its meshes out."""
+
+
+def save_scene(scene: Scene, path: str | PathLike[str]) -> None:
+    """Write `scene` to a TOML file, and its meshes as NPZ files into ``<stem>-meshes`` beside it.
+
+    `load_scene` reads an equal scene from it. Meshes are named by their content and every file
+    is replaced as a whole, the scene file last: whatever happens, the file there is complete.
+    Raises `SceneError` if it cannot be written.
+    """
+    path = Path(path)
+    folder = path.with_name(f"{path.stem}-meshes")
+
+    def save_mesh(mesh: Mesh) -> Table:
+        content = _npz(mesh)
+        file = folder / f"{hashlib.sha256(content).hexdigest()[:16]}.npz"
+        folder.mkdir(exist_ok=True)
+        _replace(file, content)
+        return {"file": file.relative_to(path.parent).as_posix()}
+
+    try:
+        _replace(path, _toml(scene, save_mesh).encode())
+    except OSError as error:
+        raise SceneError(f"it cannot be written: {error.strerror}", source=str(path)) from None
+
+
+def to_toml(scene: Scene) -> str:
+    """Return `scene` as one TOML text, for the metadata of pictures.
+
+    If its meshes have more than 1000 vertices together, each mesh is given by ``vertex_count``,
+    ``face_count`` and the ``sha256`` of its arrays; such a text does not load.
+    """
+    vertices = sum(len(shape.vertices) for shape in scene.shapes if isinstance(shape, Mesh))
+    return _toml(scene, _arrays if vertices <= MAX_INLINE_VERTICES else _summary)
+
+
+def _toml(scene: Scene, describe_mesh: Callable[[Mesh], Table]) -> str:
+    """Return `scene` as TOML, with the keys that `describe_mesh` gives for a mesh."""
+    import tomli_w
+
+    names = _material_names(scene)
+    table = {
+        "description": scene.description,
+        "camera": asdict(scene.camera),
+        "materials": {name: _material(material) for material, name in names.items()},
+        "shapes": [_shape(shape, names, describe_mesh) for shape in scene.shapes],
+    }
+    return tomli_w.dumps(table)
+
+
+def _material_names(scene: Scene) -> dict[Material, str]:
+    """Return a name for each material of `scene`, in the order of their first use."""
+    materials = dict.fromkeys(shape.material for shape in scene.shapes if shape.material)
+    return {material: f"material-{n}" for n, material in enumerate(materials, start=1)}
+
+
+def _material(material: Material) -> Table:
+    return {"type": "diffuse" if isinstance(material, Diffuse) else "phong", **asdict(material)}
+
+
+def _shape(
+    shape: Shape, names: dict[Material, str], describe_mesh: Callable[[Mesh], Table]
+) -> Table:
+    if isinstance(shape, Mesh):
+        geometry = {"type": "mesh", **describe_mesh(shape)}
+    else:
+        geometry = {"type": "sphere", "center": shape.center, "radius": shape.radius}
+    if shape.material is not None:
+        return {**geometry, "material": names[shape.material]}
+    return {**geometry, "radiance": shape.radiance}
+
+
+def _arrays(mesh: Mesh) -> Table:
+    arrays = {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
+    return arrays if mesh.normals is None else {**arrays, "normals": mesh.normals.tolist()}
+
+
+def _summary(mesh: Mesh) -> Table:
+    return {
+        "vertex_count": len(mesh.vertices),
+        "face_count": len(mesh.faces),
+        "sha256": hashlib.sha256(_npz(mesh)).hexdigest(),
+    }
+
+
+def _npz(mesh: Mesh) -> bytes:
+    normals = {} if mesh.normals is None else {"vn": mesh.normals}
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, v=mesh.vertices, f=mesh.faces, **normals)
+    return file.getvalue()
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file in one step: it is there as a whole, or as it was before."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

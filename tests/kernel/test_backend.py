@@ -1,0 +1,112 @@
+"""Each test runs in a process of its own: a process chooses its LLVM once."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from drpt.kernel import backend, llvm
+
+
+def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def last_line(done: subprocess.CompletedProcess[str]) -> str:
+    return (done.stdout + done.stderr).strip().splitlines()[-1]
+
+
+def test_importing_the_module_does_not_import_drjit() -> None:
+    done = run("import sys, drpt.kernel.backend; print('drjit' in sys.modules)")
+    assert last_line(done) == "False"
+
+
+def test_load_names_the_newest_library_to_drjit() -> None:
+    newest = llvm.choose(llvm.found(), os.environ.get(llvm.VARIABLE))
+    done = run(
+        "from drpt.kernel import backend\n"
+        "print(backend.load('llvm').__name__, backend.describe().llvm_path)"
+    )
+    assert last_line(done) == f"drjit.llvm {newest.path}"
+
+
+def test_mitsuba_uses_the_same_library() -> None:
+    done = run(
+        "from drpt.kernel import backend\n"
+        "backend.load('llvm')\n"
+        "import mitsuba\n"
+        "mitsuba.set_variant('llvm_ad_rgb')\n"
+        "mapped = {line.split()[-1] for line in open('/proc/self/maps') if 'libLLVM' in line}\n"
+        "print(mapped == {str(backend.describe().llvm_path)})"
+    )
+    assert last_line(done) == "True"
+
+
+def test_describe_tells_what_kernels_run_on(tmp_path: Path) -> None:
+    done = run(
+        "from drpt.kernel import backend\n"
+        "backend.load('llvm')\n"
+        "backend.set_thread_count(3)\n"
+        "found = backend.describe()\n"
+        "print(found.name, found.vector_width in (4, 8, 16), found.threads, found.cache)",
+        DRPT_BACKEND="llvm",
+        DRJIT_CACHE_DIR=str(tmp_path),
+    )
+    assert last_line(done) == f"llvm True 3 {tmp_path}"
+
+
+def test_without_a_library_the_error_comes_before_drjit() -> None:
+    done = run(
+        "import sys\n"
+        "from drpt.kernel import backend, llvm\n"
+        "llvm.found = list\n"
+        "try:\n"
+        "    backend.load('llvm')\n"
+        "except backend.BackendError as error:\n"
+        "    print(error, 'drjit' in sys.modules)",
+        DRJIT_LIBLLVM_PATH="",
+    )
+    assert last_line(done).startswith("no libLLVM >= 16 found: install it with")
+    assert last_line(done).endswith("False")
+
+
+def test_library_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
+    broken = tmp_path / "libLLVM.so.19.1"
+    broken.touch()
+    done = run(
+        "from drpt.kernel import backend; backend.load('llvm')", **{llvm.VARIABLE: str(broken)}
+    )
+    assert last_line(done).endswith(f"BackendError: Dr.Jit could not load LLVM from {broken}")
+
+
+def test_too_old_a_library_that_drjit_picked_earlier_is_refused() -> None:
+    done = run(
+        "import drjit\n"
+        "drjit.detail.llvm_version = lambda: (15, 0, 6)\n"
+        "from drpt.kernel import backend\n"
+        "backend.load('llvm')"
+    )
+    assert "Dr.Jit was imported before drpt and took LLVM 15.0.6" in last_line(done)
+
+
+def test_environment_names_the_backend() -> None:
+    done = run("from drpt.kernel import backend; print(backend.load())", DRPT_BACKEND="llvm")
+    assert "drjit.llvm" in last_line(done)
+
+
+def test_unknown_backend_is_an_error() -> None:
+    with pytest.raises(ValueError, match="must be one of llvm, cuda, got 'metal'"):
+        backend.load("metal")
+
+
+def test_thread_count_must_be_positive() -> None:
+    with pytest.raises(ValueError, match="at least 1, got 0"):
+        backend.set_thread_count(0)
