@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import OpenEXR  # type: ignore[import-not-found]
+import OpenEXR
 import pytest
 from PIL import Image
 

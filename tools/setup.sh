@@ -73,9 +73,10 @@ install_pip() {
 install_drpt() {
   say "installing drpt and its tools (takes a minute the first time)"
   local pip=("$venv/bin/python" -m pip --disable-pip-version-check --quiet)
-  "${pip[@]}" install --constraint constraints.txt --upgrade pip &&
-    "${pip[@]}" install --constraint constraints.txt --build-constraint constraints.txt \
-      --editable . --group dev || fail "pip could not install drpt, see above"
+  local hint="pip could not install everything, see above"
+  "${pip[@]}" install --constraint constraints.txt --upgrade pip || fail "$hint"
+  "${pip[@]}" install --constraint constraints.txt --build-constraint constraints.txt \
+    --editable . --group dev || fail "$hint"
 }
 
 # --- system libraries: LLVM, and what Dr.Jit's wheel is linked to ---------------------------------

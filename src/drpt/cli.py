@@ -327,7 +327,7 @@ def _run(rendering: Rendering, *, progress: bool) -> Result:
     return rendering.result()
 
 
-def _with_progress(rendering: Rendering, passes: Iterator[int]) -> Iterator[int]:
+def _with_progress(rendering: Rendering, passes: Iterator[float]) -> Iterator[float]:
     """Draw a bar on stderr while the passes run; it vanishes after the last."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn

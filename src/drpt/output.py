@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
-import OpenEXR  # type: ignore[import-not-found]
+import OpenEXR
 from PIL import Image, PngImagePlugin
 
 if TYPE_CHECKING:

@@ -71,6 +71,7 @@ def set_thread_count(count: int) -> None:
     """Set the number of CPU threads that kernels run on."""
     if count < 1:
         raise ValueError(f"threads must be at least 1, got {count}")
+    load()
     import drjit as dr
 
     dr.set_thread_count(count)
@@ -122,16 +123,19 @@ def _works(name: str) -> bool:
 
 
 def _check_loaded_llvm() -> None:
+    """Raise unless Dr.Jit has a usable LLVM; it may have been imported before drpt could choose."""
     import drjit as dr
 
-    if not _works("LLVM"):
-        raise BackendError(f"Dr.Jit could not load LLVM from {os.environ.get(llvm.VARIABLE)}")
-    version = dr.detail.llvm_version()
-    if version < llvm.OLDEST:
-        raise BackendError(
-            f"Dr.Jit was imported before drpt and took LLVM {'.'.join(map(str, version))}, "
-            f"too old: import drpt first, or set {llvm.VARIABLE}"
-        )
+    version = dr.detail.llvm_version() if _works("LLVM") else ()
+    if version >= llvm.OLDEST:
+        return
+    found = f"LLVM {'.'.join(map(str, version))}" if version else "no LLVM"
+    if named := os.environ.get(llvm.VARIABLE):
+        raise BackendError(f"Dr.Jit got {found} from {named}: name another in {llvm.VARIABLE}")
+    raise BackendError(
+        f"Dr.Jit was imported before drpt and took {found}: import drpt first, "
+        f"or name a libLLVM >= {llvm.OLDEST[0]} in {llvm.VARIABLE}"
+    )
 
 
 def _has_cuda_driver() -> bool:

@@ -48,9 +48,9 @@ class Brdf(NamedTuple):
 
     def eval(self, to_light: Array3f) -> Array3f:
         """f(ω_o, ω_i) times the cosine at ω_i."""
-        cosine = dr.maximum(dr.dot(self.shading_normal, to_light), 0)
+        cosine = dr.dot(self.shading_normal, to_light)
         lobe = self._either(lambda: INV_PI, lambda: self._phong_pdf(to_light))
-        return self.albedo * dr.select(self._counts(to_light), lobe * cosine, 0)
+        return self.albedo * dr.select((cosine > 0) & self._counts(to_light), lobe * cosine, 0)
 
     def pdf(self, to_light: Array3f) -> Float:
         """Solid angle: the density of :meth:`sample` at ω_i."""
@@ -89,7 +89,9 @@ class Brdf(NamedTuple):
     def _counts(self, to_light: Array3f) -> Bool | bool:
         if not self.features.interpolated_normals:
             return True
-        return (dr.dot(self.normal, to_light) > 0) & (dr.dot(self.shading_normal, self.to_viewer) > 0)
+        return (dr.dot(self.normal, to_light) > 0) & (
+            dr.dot(self.shading_normal, self.to_viewer) > 0
+        )
 
 
 def make_brdf(scene: DeviceScene, features: Features, hit: Hit, to_viewer: Array3f) -> Brdf:

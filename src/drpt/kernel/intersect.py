@@ -1,9 +1,8 @@
-"""Rays against primitives: the closest hit, what stands between two points, and the hit's surface."""
+"""Rays against primitives: the closest hit, what blocks the way, and the surface that is hit."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
@@ -27,8 +26,7 @@ together off by about ten half ulps at the most (Wächter & Binder 2019, Ray Tra
 """
 
 
-@dataclass
-class Hit:
+class Hit(NamedTuple):
     """Where a ray meets a surface.
 
     ``point`` lies off the surface by its rounding error, on the side that the ray comes from, and
@@ -52,8 +50,7 @@ def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) 
 
 
 def _closest(scene: DeviceScene, features: Features, ray: Ray) -> tuple[Float, UInt32]:
-    nearest = dr.full(type(ray.direction.x), dr.inf)
-    primitive = dr.zeros(dr.uint32_array_t(nearest))
+    nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
     for number, (inside, t) in _candidates(scene, ray):
         closer = inside & (t < nearest)
         nearest = dr.select(closer, t, nearest)
@@ -63,7 +60,7 @@ def _closest(scene: DeviceScene, features: Features, ray: Ray) -> tuple[Float, U
 
 def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32) -> Bool:
     """Whether anything but the light itself stands on the first ``distance`` of a ray."""
-    blocked = dr.full(dr.mask_t(distance), False)
+    blocked = scene.types.Bool(False)
     for number, (inside, t) in _candidates(scene, ray, shadows=True):
         between = inside & (t < distance)
         if number >= scene.first_light:
@@ -124,7 +121,8 @@ def _meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
     closest = dr.fma(ray.direction, b, f)
     r2 = ball.radius * ball.radius
     discriminant = r2 - dr.dot(closest, closest)
-    q = b + dr.copysign(dr.sqrt(discriminant), b)
+    root: Any = dr.copysign(dr.sqrt(discriminant), b)
+    q = b + root
     c = dr.dot(f, f) - r2
     other = c / q
     near, far = dr.minimum(q, other), dr.maximum(q, other)
@@ -165,7 +163,7 @@ def _on_primitive(
 
 
 def _largest(v: Array3f) -> Float:
-    return dr.max(dr.abs(v))
+    return dr.maximum(dr.maximum(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
 
 
 def _interpolated_normal(

@@ -38,14 +38,14 @@ class LightSample(NamedTuple):
     inverse_pdf: Float
 
 
-def choose_light(scene: DeviceScene, features: Features, u: Any) -> UInt32:
+def choose_light(scene: DeviceScene, features: Features, u: Callable[[], Float]) -> UInt32:
     """Discrete: a light, with the probability of its power; ``u()`` is asked for if need be."""
     if not features.light_choice:
         return scene.types.UInt32(0)
     value = u()
-    return dr.binary_search(
-        0, scene.light_count - 1, lambda i: dr.gather(type(value), scene.light_cdf, i) <= value
-    )
+    is_before = lambda i: dr.gather(type(value), scene.light_cdf, i) <= value  # noqa: E731
+    search: Any = dr.binary_search
+    return search(0, scene.light_count - 1, is_before)
 
 
 def sample_light(
@@ -67,18 +67,14 @@ def sample_light(
     )
 
 
-def inverse_pdf(
-    scene: DeviceScene, features: Features, ray: Ray, light: UInt32, hit: Hit
-) -> Float:
-    """1 / density with which :func:`sample_light`, sampling cones, finds a ray that hits a light."""
+def inverse_pdf(scene: DeviceScene, features: Features, ray: Ray, light: UInt32, hit: Hit) -> Float:
+    """1 / density with which :func:`sample_light`, sampling cones, finds the ray to a hit."""
     return scene.radiance_row(light)[3] * _by_kind(
         scene,
         features,
         light,
         lambda: TWO_PI * _cap(scene, ray.origin, light).height,
-        lambda: _area(scene, light)
-        * -dr.dot(hit.normal, ray.direction)
-        / dr.square(hit.distance),
+        lambda: _area(scene, light) * -dr.dot(hit.normal, ray.direction) / dr.square(hit.distance),
     )
 
 
@@ -143,9 +139,7 @@ def _aim_into_cone(cap: _Cap, u: Array2f) -> Aim:
 
 def _aim_at_triangle(scene: DeviceScene, point: Array3f, light: UInt32, u: Array2f) -> Aim:
     index = light - scene.sphere_lights
-    a, b, c = (
-        dr.gather(scene.types.Array3f, scene.light_corners, 3 * index + k) for k in range(3)
-    )
+    a, b, c = (dr.gather(scene.types.Array3f, scene.light_corners, 3 * index + k) for k in range(3))
     weights = square_to_triangle(u)
     target = a + weights.x * (b - a) + weights.y * (c - a)
     row = scene.geometry_row(scene.first_light + light)

@@ -18,7 +18,7 @@ bounces,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
@@ -37,6 +37,22 @@ if TYPE_CHECKING:
     from drpt.kernel.sampler import Sampler
 
 
+UNROLLED_VERTICES = 4
+"""So many vertices of a path stand one after the other in the kernel; a loop takes the rest."""
+
+
+class Path(NamedTuple):
+    """A path that has reached a ray towards its next vertex."""
+
+    origin: Array3f
+    direction: Array3f
+    active: Bool  # whether there is a next vertex
+    beta: Array3f  # throughput up to it
+    pdf: Float  # density of the direction by the BRDF, for MIS
+    radiance: Array3f  # collected so far
+    rays: UInt32  # traced so far
+
+
 @dataclass
 class Tracer:
     """A path tracer for one scene and one estimator."""
@@ -48,36 +64,69 @@ class Tracer:
 
     def trace(self, ray: Ray, sampler: Sampler) -> tuple[Array3f, UInt32]:
         """Radiance (W/(m² sr), three channels) along camera rays, and how many rays it took."""
-        scene, features, mode = self.scene, self.features, self.mode
-        types = scene.types
-        radiance = types.Array3f(0)  # collected so far
-        rays = types.UInt32(0)  # traced so far
-        beta = types.Array3f(1)  # throughput up to the current vertex
-        pdf = None  # density of the ray by the BRDF, for MIS
-        active = types.Bool(True)
-        for depth in range(self.bounces + 1 if features.emission else 0):
-            rays += dr.select(active, 1, 0)
-            hit = closest_hit(scene, features, ray, active)
-            if depth == 0 or mode.counts_hits:
-                radiance += beta * self._emission(ray, hit, pdf)
-            if depth == self.bounces:
-                break
-            active = hit.valid & (hit.primitive < scene.first_light)
-            hit.valid = active
-            brdf = make_brdf(scene, features, hit, -ray.direction)
-            if features.direct_light:
-                light, traced = self._direct(hit, brdf, sampler, depth)
-                radiance += beta * light
-                rays += dr.select(traced, 1, 0)
-            if depth == self.bounces - 1 and not mode.counts_hits:
-                break
-            direction, weight = self._next_direction(brdf, sampler, depth)
-            if features.mis:
-                pdf = brdf.pdf(direction)
-            ray = Ray(hit.point, direction)
-            beta = beta * weight
-            active &= dr.max(beta) > 0
-        return radiance, rays
+        types = self.scene.types
+        path = Path(
+            origin=ray.origin,
+            direction=ray.direction,
+            active=types.Bool(True),
+            beta=types.Array3f(1),
+            pdf=types.Float32(0),
+            radiance=types.Array3f(0),
+            rays=types.UInt32(0),
+        )
+        unrolled = min(self._vertices, UNROLLED_VERTICES)
+        for depth in range(unrolled):
+            path = self._vertex(path, sampler, depth)
+        if unrolled < self._vertices:
+            path = self._loop(path, sampler, unrolled)
+        return path.radiance, path.rays
+
+    def _loop(self, path: Path, sampler: Sampler, first: int) -> Path:
+        """Follow the paths that go on, from vertex number ``first``."""
+
+        def goes_on(depth: UInt32, *path: Any) -> Bool:
+            return Path(*path).active & (depth < self._vertices)
+
+        def step(depth: UInt32, *path: Any) -> tuple[Any, ...]:
+            return depth + 1, *self._vertex(Path(*path), sampler, depth)
+
+        state: tuple[Any, ...] = (self.scene.types.UInt32(first), *path)
+        return Path(*dr.while_loop(state, goes_on, step)[1:])
+
+    @property
+    def _vertices(self) -> int:
+        """How many vertices a path has, beside the eye; the last one only emits."""
+        if not self.features.emission:
+            return 0
+        return self.bounces + 1 if self.bounces == 0 or self.mode.counts_hits else self.bounces
+
+    def _vertex(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Path:
+        """Find the next vertex, collect the light that it sends, and choose where to go on."""
+        scene, features = self.scene, self.features
+        ray = Ray(path.origin, path.direction)
+        radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
+        hit = closest_hit(scene, features, ray, path.active)
+        is_first = isinstance(depth, int) and depth == 0
+        if is_first or self.mode.counts_hits:
+            weighted = features.mis and not is_first
+            emitted = self._emission(ray, hit, path.pdf if weighted else None)
+            radiance = radiance + path.beta * emitted
+        if isinstance(depth, int) and depth == self.bounces:
+            return path._replace(radiance=radiance, rays=rays)
+        reflects = hit.primitive < scene.first_light
+        hit = hit._replace(valid=hit.valid & reflects & (depth < self.bounces))
+        brdf = make_brdf(scene, features, hit, -ray.direction)
+        if features.direct_light:
+            light, traced = self._direct(hit, brdf, sampler, depth)
+            radiance = radiance + path.beta * light
+            rays = rays + dr.select(traced, 1, 0)
+        if isinstance(depth, int) and depth == self._vertices - 1:
+            return path._replace(radiance=radiance, rays=rays)
+        direction, weight = self._next_direction(brdf, sampler, depth)
+        beta = path.beta * weight
+        active = hit.valid & (dr.max(beta) > 0)
+        pdf = brdf.pdf(direction) if features.mis else path.pdf
+        return Path(hit.point, direction, active, beta, pdf, radiance, rays)
 
     def _emission(self, ray: Ray, hit: Hit, pdf: Float | None) -> Array3f:
         """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
@@ -94,7 +143,7 @@ class Tracer:
         return radiance * power_heuristic(density / pdf)
 
     def _direct(
-        self, hit: Hit, brdf: Brdf, sampler: Sampler, depth: int
+        self, hit: Hit, brdf: Brdf, sampler: Sampler, depth: int | UInt32
     ) -> tuple[Array3f, Bool]:
         """Direct light by one sample of one light, and where that took a shadow ray."""
         scene, features = self.scene, self.features
@@ -109,7 +158,7 @@ class Tracer:
         return dr.select(traced & ~shadow, value, 0), traced
 
     def _next_direction(
-        self, brdf: Brdf, sampler: Sampler, depth: int
+        self, brdf: Brdf, sampler: Sampler, depth: int | UInt32
     ) -> tuple[Array3f, Array3f]:
         """The direction in which a path goes on, and its weight f cos θ / p."""
         u = sampler.next_2d(_decision(depth, 2))
@@ -119,6 +168,6 @@ class Tracer:
         return direction, brdf.eval(direction) / sphere_pdf()
 
 
-def _decision(depth: int, kind: int) -> int:
+def _decision(depth: int | UInt32, kind: int) -> int | UInt32:
     """Number of a vertex' decision: light (0), point on it (1), next direction (2)."""
     return 1 + 3 * depth + kind

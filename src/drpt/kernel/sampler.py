@@ -17,11 +17,13 @@ from drpt.kernel.vec import types_of, vec2
 if TYPE_CHECKING:
     from drjit.auto import Array2f, Float, UInt32
 
+    _Four: TypeAlias = tuple[UInt32, UInt32, UInt32, UInt32]
+
 _ONE_ULP_BELOW_ONE = 2.0**-24
 _FIRST_ULP = 8
 
 
-def hash4(x: UInt32, y: UInt32, z: UInt32, w: UInt32) -> tuple[UInt32, UInt32, UInt32, UInt32]:
+def hash4(x: UInt32, y: UInt32, z: UInt32, w: UInt32) -> _Four:
     """Bijective hash of 128 bits: no two inputs share their output.
 
     Source: ``pcg4d`` of Jarzynski & Olano 2020, "Hash Functions for GPU Rendering".
@@ -32,7 +34,7 @@ def hash4(x: UInt32, y: UInt32, z: UInt32, w: UInt32) -> tuple[UInt32, UInt32, U
     return _pcg4d_round(x, y, z, w)
 
 
-def _pcg4d_round(x: UInt32, y: UInt32, z: UInt32, w: UInt32) -> tuple[UInt32, ...]:
+def _pcg4d_round(x: UInt32, y: UInt32, z: UInt32, w: UInt32) -> _Four:
     x = x + y * w
     y = y + z * x
     z = z + x * y
@@ -62,7 +64,7 @@ class IndependentSampler:
         x, y, _, _ = self._bits(decision)
         return vec2(unit_float(x), unit_float(y))
 
-    def _bits(self, decision: Any) -> tuple[UInt32, ...]:
+    def _bits(self, decision: Any) -> _Four:
         return hash4(self.pixel, self.index, type(self.pixel)(decision), self.seed)
 
 
@@ -92,7 +94,7 @@ class SobolSampler:
         y = owen_scramble(pascal_product(i), scramble_y)
         return vec2(unit_float(dr.brev(x)), unit_float(dr.brev(y)))
 
-    def _seeds(self, decision: Any) -> tuple[UInt32, ...]:
+    def _seeds(self, decision: Any) -> _Four:
         return hash4(self.pixel, type(self.pixel)(decision), self.seed, type(self.pixel)(0))
 
     def _shuffled(self, seed: UInt32) -> UInt32:

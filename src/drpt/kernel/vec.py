@@ -43,7 +43,7 @@ def frame(n: Array3f) -> Frame:
 
     Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
     """
-    sign = dr.copysign(1, n.z)
+    sign: Any = dr.copysign(type(n.z)(1), n.z)
     a = -dr.rcp(sign + n.z)
     b = n.x * n.y * a
     s = vec3(dr.fma(sign * n.x * n.x, a, 1), sign * b, -sign * n.x)
@@ -77,7 +77,7 @@ def sincos_2pi(u: Float) -> tuple[Float, Float]:
 
 def horner(x: Float, *coefficients: float) -> Float:
     """Polynomial in ``x``, coefficients from the constant upward."""
-    value = dr.full(type(x), coefficients[-1])
+    value = type(x)(coefficients[-1])
     for c in reversed(coefficients[:-1]):
         value = dr.fma(value, x, c)
     return value
@@ -86,4 +86,6 @@ def horner(x: Float, *coefficients: float) -> Float:
 def _flip_sign(x: Float, quadrant: Any) -> Float:
     """``-x`` in the quadrants 2 and 3 (modulo 4), ``x`` in the others."""
     sign_bit = (quadrant & 2) << 30
-    return dr.reinterpret_array(type(x), dr.reinterpret_array(type(sign_bit), x) ^ sign_bit)
+    bits: Any = dr.reinterpret_array(type(sign_bit), x)
+    flipped: Any = dr.reinterpret_array(type(x), bits ^ sign_bit)
+    return flipped

@@ -76,7 +76,7 @@ def square_to_phong_lobe(u: Array2f, exponent: Float) -> Array3f:
 
 
 def phong_lobe_pdf(below_pole: Float, exponent: Float) -> Float:
-    """Density of :func:`square_to_phong_lobe` where 1 − cos θ = ``below_pole``; 0 below the plane."""
+    """Density of :func:`square_to_phong_lobe` where 1 − cos θ = ``below_pole``; 0 from 1 on."""
     return (exponent + 1) * INV_TWO_PI * power_near_pole(below_pole, exponent)
 
 

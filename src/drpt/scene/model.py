@@ -52,7 +52,7 @@ class Camera:
     width: int
     height: int
 
-    def __init__(  # noqa: PLR0913, PLR0917 - a camera has six parameters
+    def __init__(
         self, eye: Vector, target: Vector, up: Vector, fov: float, width: int, height: int
     ) -> None:
         _set(

@@ -1,0 +1,129 @@
+"""One launch: samples of some pixels, traced and summed on the device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import drjit as dr
+import numpy as np
+
+from drpt.kernel.camera import DeviceCamera, make_camera
+from drpt.kernel.device_scene import upload
+from drpt.kernel.estimator import Features
+from drpt.kernel.path import Tracer
+from drpt.kernel.primitives import make_primitives
+from drpt.kernel.sampler import SAMPLERS
+from drpt.kernel.vec import vec2
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from drjit.auto import Array3f, Array3f64, UInt32
+    from numpy.typing import NDArray
+
+    from drpt.kernel.estimator import Mode
+    from drpt.kernel.sampler import Sampler
+    from drpt.scene import Scene
+
+
+class Sums(NamedTuple):
+    """Sums over the samples of a launch.
+
+    ``radiance`` of each pixel (pixels, 3); how many ``rays`` were traced; how many samples were
+    ``non_finite``.
+    """
+
+    radiance: NDArray[np.float64]
+    rays: int
+    non_finite: int
+
+
+@dataclass
+class Launcher:
+    """A scene and an estimator on the device, ready to trace samples."""
+
+    tracer: Tracer
+    camera: DeviceCamera
+    sampler: type[Sampler]
+    jitter: bool
+
+    def launch(self, pixels: range, samples: range, replicates: int, seed: int) -> Sums:
+        """Trace a range of samples of each pixel in a range.
+
+        Each pixel takes ``replicates`` lanes that share its samples, each every so manyth. All of
+        the arguments are inputs of one and the same kernel.
+        """
+        index = self.tracer.scene.types.UInt32
+        seed_word = np.random.SeedSequence(seed).generate_state(1)[0] + (samples.start >> 32)
+        inputs = (
+            pixels.start,
+            len(pixels),
+            samples.start & 0xFFFFFFFF,
+            len(samples),
+            replicates,
+            int(seed_word) & 0xFFFFFFFF,
+        )
+        lane = dr.arange(index, len(pixels) * replicates)
+        radiance, rays, non_finite = self._trace(lane, *(dr.opaque(index, i) for i in inputs))
+        dr.eval(radiance, rays, non_finite)
+        by_lane = np.array(radiance).reshape(3, replicates, len(pixels))
+        return Sums(by_lane.sum(axis=1).T, _total(rays), _total(non_finite))
+
+    def _trace(
+        self,
+        lane: UInt32,
+        first_pixel: UInt32,
+        pixels: UInt32,
+        first_sample: UInt32,
+        samples: UInt32,
+        replicates: UInt32,
+        seed: UInt32,
+    ) -> tuple[Array3f64, UInt32, UInt32]:
+        """Sum up the samples of each lane: radiance, rays, and how many were not finite."""
+        types = self.tracer.scene.types
+        replicate = lane // pixels
+        pixel = first_pixel + lane - replicate * pixels
+
+        def add_sample(
+            i: UInt32, total: Array3f64, rays: UInt32, non_finite: UInt32
+        ) -> tuple[UInt32, Array3f64, UInt32, UInt32]:
+            radiance, traced = self._sample(self.sampler(pixel, first_sample + i, seed))
+            finite = dr.isfinite(dr.sum(radiance))
+            return (
+                i + replicates,
+                total + types.Array3f64(radiance),
+                rays + traced,
+                non_finite + dr.select(finite, 0, 1),
+            )
+
+        state = (replicate, types.Array3f64(0), types.UInt32(0), types.UInt32(0))
+        return dr.while_loop(state, lambda i, *_: i < samples, add_sample)[1:]
+
+    def _sample(self, sampler: Sampler) -> tuple[Array3f, UInt32]:
+        middle = self.tracer.scene.types.Float32(0.5)
+        offset = sampler.next_2d(0) if self.jitter else vec2(middle, middle)
+        return self.tracer.trace(self.camera.ray(sampler.pixel, offset), sampler)
+
+    def operations(self) -> int:
+        """Dr.Jit's count of the operations in the kernel."""
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            self.launch(range(1), range(0), 1, 0)
+            kernels = dr.kernel_history((dr.KernelType.JIT,))
+        return max(kernel["operation_count"] for kernel in kernels)
+
+
+def make_launcher(
+    types: ModuleType, scene: Scene, bounces: int, mode: Mode, sampler: str, *, jitter: bool
+) -> Launcher:
+    """Put a scene on the device of the backend ``types``, for kernels with what it needs."""
+    primitives = make_primitives(scene)
+    features = Features.of(primitives, bounces, mode)
+    tracer = Tracer(upload(primitives, types), features, mode, bounces)
+    camera = make_camera(scene.camera, primitives.origin, types)
+    return Launcher(tracer, camera, SAMPLERS[sampler], jitter)
+
+
+def _total(counts: UInt32) -> int:
+    return int(np.array(counts).sum(dtype=np.int64))
