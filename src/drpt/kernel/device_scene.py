@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
+from drpt.kernel.mesh import TriangleMesh
+from drpt.kernel.primitives import UNROLL_LIMIT
+
 if TYPE_CHECKING:
     from types import ModuleType
 
@@ -34,8 +37,10 @@ class DeviceScene:
     ----------
     facets, blockers
         Constants of each facet, and whether it can cast a shadow.
+    mesh
+        The triangles, where they are too many for facets.
     balls
-        Each sphere, if they are few.
+        Each sphere, where they are few.
     geometry
         Rows of 4 by primitive: (normal, offset) or (centre, radius).
     reflectance
@@ -54,9 +59,10 @@ class DeviceScene:
     first_smooth: int
     first_sphere: int
     first_light: int
-    first_light_triangle: int
+    sphere_count: int
     facets: tuple[Facet, ...]
     blockers: tuple[bool, ...]
+    mesh: TriangleMesh | None
     balls: tuple[Ball, ...]
     geometry: Float
     reflectance: Float
@@ -84,6 +90,8 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         return types.Float32(values.astype(np.float32).ravel())
 
     pmf = primitives.light_pmf()
+    triangles = primitives.triangles
+    few_spheres = len(primitives.spheres) <= UNROLL_LIMIT
     first = primitives.first_sphere
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
     return DeviceScene(
@@ -91,10 +99,11 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         first_smooth=primitives.first_smooth,
         first_sphere=first,
         first_light=primitives.first_light,
-        first_light_triangle=primitives.first_light_triangle,
+        sphere_count=len(primitives.spheres),
         facets=primitives.facets,
         blockers=tuple(primitives.blockers()),
-        balls=tuple(_ball(row, types) for row in primitives.spheres),
+        mesh=TriangleMesh(triangles, types) if len(triangles) else None,
+        balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
         geometry=array(np.concatenate([planes, primitives.spheres, lit_planes])),
         reflectance=array(primitives.reflectance),
         smooth=array(

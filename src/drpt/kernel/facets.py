@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -69,12 +69,12 @@ def bounds(facet: Facet, points: Array, radii: Array) -> bool:
     return bool((distance - radii >= -slack).all() or (distance + radii <= slack).all())
 
 
-def merge_coplanar(triangles: Array) -> list[Array]:
-    """Join the coplanar ones among triangles (m, 3, 3) while what they form is convex."""
+def merge_coplanar(polygons: Iterable[Array]) -> list[Array]:
+    """Join the coplanar ones among convex polygons (k, 3) while what they form is convex."""
     outlines: dict[int, Outline] = {}
     owner: dict[tuple[Corner, Corner], int] = {}
-    for index, triangle in enumerate(triangles):
-        outline: Outline = tuple(map(tuple, triangle.tolist()))
+    for index, polygon in enumerate(polygons):
+        outline: Outline = tuple(map(tuple, polygon.tolist()))
         while (joined := _join_neighbour(outline, outlines, owner)) is not None:
             neighbour, outline = joined
             for edge in _edges(outlines.pop(neighbour)):

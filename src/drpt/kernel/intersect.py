@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
+from drpt.kernel.device_scene import Ball
 from drpt.kernel.vec import vec3
 
 if TYPE_CHECKING:
@@ -14,9 +15,10 @@ if TYPE_CHECKING:
     from drjit.auto import Array3f, Bool, Float, UInt32
 
     from drpt.kernel.camera import Ray
-    from drpt.kernel.device_scene import Ball, DeviceScene
+    from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
     from drpt.kernel.facets import Facet
+    from drpt.kernel.mesh import TriangleMesh
 
 SPAWN_OFFSET = 2.0**-20
 """How far off its surface a ray starts, relative to the coordinates there: 16 half ulps.
@@ -45,42 +47,71 @@ class Hit(NamedTuple):
 
 def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
     """The first surface that a ray meets."""
-    t, primitive = _closest(scene, features, ray)
-    return _surface(scene, features, ray, t, primitive, active & (t < dr.inf))
-
-
-def _closest(scene: DeviceScene, features: Features, ray: Ray) -> tuple[Float, UInt32]:
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
-    for number, (inside, t) in _candidates(scene, ray):
-        closer = inside & (t < nearest)
+    for number, met, t in _candidates(scene, ray, active):
+        closer = met & (t < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
-    return nearest, primitive
+    return _surface(scene, features, ray, nearest, primitive, active & (nearest < dr.inf))
 
 
-def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32) -> Bool:
+def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, active: Bool) -> Bool:
     """Whether anything but the light itself stands on the first ``distance`` of a ray."""
     blocked = scene.types.Bool(False)
-    for number, (inside, t) in _candidates(scene, ray, shadows=True):
-        between = inside & (t < distance)
-        if number >= scene.first_light:
-            between &= light != number - scene.first_light
-        blocked |= between
+    for _, met, t in _candidates(scene, ray, active, skip=scene.first_light + light):
+        blocked |= met & (t < distance)
     return blocked
 
 
 def _candidates(
-    scene: DeviceScene, ray: Ray, *, shadows: bool = False
-) -> Iterator[tuple[int, tuple[Bool, Float]]]:
-    """Number of each primitive, whether the ray's line meets it before it, and where."""
+    scene: DeviceScene, ray: Ray, active: Bool, skip: UInt32 | None = None
+) -> Iterator[tuple[Any, Bool, Float]]:
+    """What a ray may meet first: a primitive's number, whether it is met beyond 0, and where.
+
+    For shadow rays, ``skip`` is the number of the light that they lead to, which casts none.
+    """
+    if scene.mesh is not None:
+        yield _closest_of_mesh(scene, scene.mesh, ray, active, skip)
     for index, (facet, blocks) in enumerate(zip(scene.facets, scene.blockers, strict=True)):
-        if blocks or not shadows:
-            number = index if index < scene.first_sphere else index + len(scene.balls)
-            yield number, _meet_facet(ray, facet)
-    for index, ball in enumerate(scene.balls):
-        number = scene.first_sphere + index
-        if not (shadows and scene.light_count == 1 and number >= scene.first_light):
-            yield number, _meet_sphere(ray, ball)
+        number = index if index < scene.first_sphere else index + scene.sphere_count
+        if blocks or skip is None:
+            met, t = _meet_facet(ray, facet)
+            yield number, met & _counts(scene, number, skip), t
+    for number, ball in enumerate(scene.balls, start=scene.first_sphere):
+        met, t = _meet_sphere(ray, ball)
+        yield number, met & _counts(scene, number, skip), t
+    if scene.sphere_count > len(scene.balls):
+        yield _closest_of_spheres(scene, ray, active, skip)
+
+
+def _counts(scene: DeviceScene, number: int, skip: UInt32 | None) -> Bool | bool:
+    return True if skip is None or number < scene.first_light else skip != number
+
+
+def _closest_of_mesh(
+    scene: DeviceScene, mesh: TriangleMesh, ray: Ray, active: Bool, skip: UInt32 | None
+) -> tuple[UInt32, Bool, Float]:
+    index, met, t = mesh.closest(ray, active)
+    number = index + dr.select(index < scene.first_sphere, 0, scene.sphere_count)
+    return number, met if skip is None else met & (number != skip), t
+
+
+def _closest_of_spheres(
+    scene: DeviceScene, ray: Ray, active: Bool, skip: UInt32 | None
+) -> tuple[UInt32, Bool, Float]:
+    """The first of many spheres, by a loop over them."""
+    types = scene.types
+
+    def step(number: UInt32, nearest: Float, found: UInt32) -> tuple[UInt32, Float, UInt32]:
+        row = scene.geometry_row(number)
+        met, t = _meet_sphere(ray, Ball(vec3(row[0], row[1], row[2]), row[3]))
+        closer = met & (t < nearest) & (True if skip is None else number != skip)
+        return number + 1, dr.select(closer, t, nearest), dr.select(closer, number, found)
+
+    end = scene.first_sphere + scene.sphere_count
+    state = (types.UInt32(scene.first_sphere), types.Float32(dr.inf), types.UInt32(0))
+    _, t, number = dr.while_loop(state, lambda i, *_: active & (i < end), step)
+    return number, t < dr.inf, t
 
 
 def _meet_facet(ray: Ray, facet: Facet) -> tuple[Bool, Float]:
@@ -156,7 +187,9 @@ def _on_primitive(
         return on_facet, vector, _largest(on_facet)
     if not features.triangles:
         return on_sphere, outward, _largest(on_sphere) + row[3]
-    is_sphere = (primitive >= scene.first_sphere) & (primitive < scene.first_light_triangle)
+    is_sphere = (primitive >= scene.first_sphere) & (
+        primitive < scene.first_sphere + scene.sphere_count
+    )
     point = dr.select(is_sphere, on_sphere, on_facet)
     reach = _largest(point) + dr.select(is_sphere, row[3], 0)
     return point, dr.select(is_sphere, outward, vector), reach

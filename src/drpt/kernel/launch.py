@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 import drjit as dr
@@ -119,6 +120,8 @@ def make_launcher(
 ) -> Launcher:
     """Put a scene on the device of the backend ``types``, for kernels with what it needs."""
     primitives = make_primitives(scene)
+    if len(primitives.triangles):
+        types = import_module(f"{types.__name__}.ad")  # Mitsuba's, for its meshes
     features = Features.of(primitives, bounces, mode)
     tracer = Tracer(upload(primitives, types), features, mode, bounces)
     camera = make_camera(scene.camera, primitives.origin, types)

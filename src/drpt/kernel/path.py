@@ -154,7 +154,7 @@ class Tracer:
         if features.mis:
             value *= power_heuristic(brdf.pdf(sample.direction) * sample.inverse_pdf)
         traced = hit.valid & (dr.max(value) > 0)
-        shadow = occluded(scene, Ray(hit.point, sample.direction), sample.distance, light)
+        shadow = occluded(scene, Ray(hit.point, sample.direction), sample.distance, light, traced)
         return dr.select(traced & ~shadow, value, 0), traced
 
     def _next_direction(

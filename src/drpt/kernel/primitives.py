@@ -89,11 +89,6 @@ class Primitives:
         return len(self.reflectance)
 
     @property
-    def first_light_triangle(self) -> int:
-        """Number of the first triangle that emits, after the last sphere."""
-        return self.first_sphere + len(self.spheres)
-
-    @property
     def diffuse(self) -> NDArray[np.bool_]:
         """Which of the reflecting primitives are diffuse; the others are Phong."""
         return np.asarray(self.reflectance[:, 3] == DIFFUSE)
@@ -112,6 +107,8 @@ class Primitives:
 
     def blockers(self) -> list[bool]:
         """Whether each facet can stand between two points of the scene."""
+        if not self.facets:
+            return []
         corners = [f.corners for f in self.facets]
         points = np.concatenate([*corners, self.spheres[:, :3]])
         radii = np.zeros(len(points))
@@ -124,23 +121,22 @@ def make_primitives(scene: Scene) -> Primitives:
     origin = _origin(scene.shapes)
     meshes = [shape for shape in scene.shapes if isinstance(shape, Mesh)]
     spheres = [shape for shape in scene.shapes if isinstance(shape, Sphere)]
-    merge = sum(len(mesh.faces) for mesh in meshes) <= MERGE_LIMIT
-    flat = [_part(m, origin, merge=merge) for m in meshes if not m.is_light and m.normals is None]
+    flat = [_part(m, origin) for m in meshes if not m.is_light and m.normals is None]
     smooth = [_part(m, origin) for m in meshes if not m.is_light and m.normals is not None]
     lit = [_part(m, origin) for m in meshes if m.is_light]
-    dull_spheres = [_Part(s, [_row(s, origin)]) for s in spheres if not s.is_light]
-    lit_spheres = [_Part(s, [_row(s, origin)]) for s in spheres if s.is_light]
-    polygons = _joined([*flat, *smooth, *lit])
-    few = len(polygons) <= UNROLL_LIMIT
+    flat, facets = _unrolled(flat, [*smooth, *lit])
+    parts = [*flat, *smooth, *lit]
+    dull_spheres = [_Part(s, _row(s, origin)) for s in spheres if not s.is_light]
+    lit_spheres = [_Part(s, _row(s, origin)) for s in spheres if s.is_light]
     return Primitives(
         origin=origin,
-        facets=tuple(map(make_facet, polygons)) if few else (),
-        triangles=_stack([] if few else polygons, 3, 3),
-        planes=_planes(_stack([polygon[:3] for polygon in polygons], 3, 3)),
-        smooth_corners=_stack(_joined(smooth), 3, 3),
-        smooth_normals=_stack([n for part in smooth for n in part.normals], 3, 3),
-        light_corners=_stack(_joined(lit), 3, 3),
-        spheres=_stack(_joined([*dull_spheres, *lit_spheres]), 4),
+        facets=facets,
+        triangles=_joined([] if facets else parts, 3, 3),
+        planes=_planes(_joined([p._replace(primitives=_triangles(p)) for p in parts], 3, 3)),
+        smooth_corners=_joined(smooth, 3, 3),
+        smooth_normals=np.concatenate([np.empty((0, 3, 3)), *(part.normals for part in smooth)]),
+        light_corners=_joined(lit, 3, 3),
+        spheres=_joined([*dull_spheres, *lit_spheres], 4),
         sphere_lights=len(lit_spheres),
         reflectance=_rows([*flat, *smooth, *dull_spheres], _reflectance, 4),
         radiance=_rows([*lit_spheres, *lit], lambda shape: shape.radiance or (), 3),
@@ -148,23 +144,38 @@ def make_primitives(scene: Scene) -> Primitives:
 
 
 class _Part(NamedTuple):
-    """The primitives of a shape; the corner normals of each triangle where it has some."""
+    """The primitives of a shape: a sphere's row (1, 4), or a mesh' polygons.
+
+    Polygons are triangles (n, 3, 3), with ``normals`` at their corners where the mesh has some;
+    or a list of outlines (k, 3), once they are merged.
+    """
 
     shape: Shape
-    primitives: list[Array]
-    normals: list[Array] = []  # noqa: RUF012 - never changed
+    primitives: Array | list[Array]
+    normals: Array = np.empty((0, 3, 3))
 
 
-def _part(mesh: Mesh, origin: Array, *, merge: bool = False) -> _Part:
+def _part(mesh: Mesh, origin: Array) -> _Part:
     corners = mesh.vertices[mesh.faces] - origin
     kept = has_area(corners)
-    triangles = corners[kept]
-    normals = [] if mesh.normals is None else list(mesh.normals[mesh.faces[kept]])
-    return _Part(mesh, merge_coplanar(triangles) if merge else list(triangles), normals)
+    if mesh.normals is None:
+        return _Part(mesh, corners[kept])
+    return _Part(mesh, corners[kept], mesh.normals[mesh.faces[kept]])
+
+
+def _unrolled(flat: list[_Part], others: list[_Part]) -> tuple[list[_Part], tuple[Facet, ...]]:
+    """Facets, and the flat parts with coplanar triangles merged; no facets if they are many."""
+    if sum(len(part.primitives) for part in (*flat, *others)) > MERGE_LIMIT:
+        return flat, ()
+    merged = [part._replace(primitives=merge_coplanar(part.primitives)) for part in flat]
+    polygons = [polygon for part in (*merged, *others) for polygon in part.primitives]
+    if len(polygons) > UNROLL_LIMIT:
+        return flat, ()
+    return merged, tuple(map(make_facet, polygons))
 
 
 def _row(sphere: Sphere, origin: Array) -> Array:
-    return np.array([*(sphere.center - origin), sphere.radius])
+    return np.array([[*(sphere.center - origin), sphere.radius]])
 
 
 def _reflectance(shape: Shape) -> tuple[float, ...]:
@@ -173,18 +184,22 @@ def _reflectance(shape: Shape) -> tuple[float, ...]:
     return (*material.albedo, material.exponent if isinstance(material, Phong) else DIFFUSE)
 
 
-def _joined(parts: list[_Part]) -> list[Array]:
-    return [primitive for part in parts for primitive in part.primitives]
+def _joined(parts: list[_Part], *shape: int) -> Array:
+    """Primitives of all parts, (n, *shape)."""
+    return np.concatenate([np.empty((0, *shape)), *(part.primitives for part in parts)])
+
+
+def _triangles(part: _Part) -> Array:
+    """A triangle in the plane of each polygon, (n, 3, 3)."""
+    if isinstance(part.primitives, list):
+        return np.array([outline[:3] for outline in part.primitives]).reshape(-1, 3, 3)
+    return part.primitives
 
 
 def _rows(parts: list[_Part], row: Callable[[Shape], tuple[float, ...]], width: int) -> Array:
     """The row of each part's shape, once for each of its primitives, (n, width)."""
-    counts = [len(part.primitives) for part in parts]
-    return np.repeat(_stack([np.array(row(part.shape)) for part in parts], width), counts, axis=0)
-
-
-def _stack(items: list[Array], *shape: int) -> Array:
-    return np.stack(items) if items else np.empty((0, *shape))
+    rows = np.array([row(part.shape) for part in parts]).reshape(-1, width)
+    return np.repeat(rows, [len(part.primitives) for part in parts], axis=0)
 
 
 def _planes(corners: Array) -> Array:
