@@ -111,10 +111,11 @@ def _cap(scene: DeviceScene, point: Array3f, light: UInt32) -> _Cap:
     to_center = vec3(row[0], row[1], row[2]) - point
     radius = row[3]
     distance = dr.norm(to_center)
-    sine = radius / distance
-    cosine = dr.sqrt((distance - radius) * (distance + radius)) / distance
+    scale = dr.rcp(distance)
+    sine = radius * scale
+    cosine = dr.sqrt((distance - radius) * (distance + radius)) * scale
     height = dr.select(distance > radius, sine * sine / (1 + cosine), 0)
-    return _Cap(to_center / distance, distance, radius, height)
+    return _Cap(to_center * scale, distance, radius, height)
 
 
 def _aim_at_sphere(

@@ -84,7 +84,7 @@ class SobolSampler:
     def next_1d(self, decision: Any) -> Float:
         """A number in [0, 1) for this decision; stratified over each aligned run of 2ᵏ samples."""
         shuffle, _, _, scramble = self._seeds(decision)
-        return unit_float(dr.brev(owen_scramble(self._shuffled(~shuffle), scramble)))
+        return unit_float(dr.brev(owen_scramble(self._shuffled(shuffle), scramble)))
 
     def next_2d(self, decision: Any) -> Array2f:
         """A point in [0, 1)² for this decision; a (0, 2)-sequence over the samples of a pixel."""

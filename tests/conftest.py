@@ -1,0 +1,39 @@
+"""Loads the backend before test modules import kernels; moves arrays to the device and back."""
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from drpt.kernel import backend
+from tests.oracle.arrays import Floats
+
+TYPES = backend.load()
+
+
+@pytest.fixture(scope="session")
+def types() -> ModuleType:
+    """Dr.Jit's module of array types, ``drjit.llvm`` or ``drjit.cuda``."""
+    return TYPES
+
+
+def to_device(values: npt.ArrayLike) -> Any:
+    """Return numbers (n,) as floats of the device, rows (n, 2) or (n, 3) as its vectors."""
+    array = np.asarray(values, np.float32)
+    if array.ndim == 1:
+        return TYPES.Float32(array)
+    vector = {2: TYPES.Array2f, 3: TYPES.Array3f}[array.shape[1]]
+    return vector(*(TYPES.Float32(column) for column in np.ascontiguousarray(array.T)))
+
+
+def to_host(array: Any) -> Floats:
+    """Return numbers of the device as (n,), its vectors as rows (n, 2) or (n, 3)."""
+    return np.array(array, np.float64).T
+
+
+def unit_square(count: int, seed: int = 0) -> Any:
+    """Return points of the unit square at random, of 24 bits each like those of a sampler."""
+    rng = np.random.default_rng(seed)
+    return to_device(rng.integers(0, 2**24, (count, 2)) * 2.0**-24)
