@@ -89,7 +89,8 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     def array(values: NDArray[np.float64]) -> Float:
         return types.Float32(values.astype(np.float32).ravel())
 
-    pmf = primitives.light_pmf()
+    cdf = primitives.light_cdf()
+    pmf = np.diff(cdf, prepend=0)
     triangles = primitives.triangles
     few_spheres = len(primitives.spheres) <= UNROLL_LIMIT
     first = primitives.first_sphere
@@ -111,7 +112,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         ),
         radiance=array(np.column_stack([primitives.radiance, 1 / pmf])),
         light_area=array(primitives.light_areas()),
-        light_cdf=array(np.cumsum(pmf)),
+        light_cdf=array(cdf),
         light_corners=array(primitives.light_corners),
         light_count=len(pmf),
         sphere_lights=primitives.sphere_lights,

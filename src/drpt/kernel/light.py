@@ -29,9 +29,8 @@ class Aim(NamedTuple):
 
 
 class LightSample(NamedTuple):
-    """A light chosen by its power and a direction to it; ``inverse_pdf`` is that of both."""
+    """A direction to a chosen light; ``inverse_pdf`` counts the choice, too."""
 
-    light: UInt32
     direction: Array3f
     distance: Float
     radiance: Array3f
@@ -39,7 +38,7 @@ class LightSample(NamedTuple):
 
 
 def choose_light(scene: DeviceScene, features: Features, u: Callable[[], Float]) -> UInt32:
-    """Discrete: a light, with the probability of its power; ``u()`` is asked for if need be."""
+    """Discrete: one of the lights; ``u()`` is asked for where there are several."""
     if not features.light_choice:
         return scene.types.UInt32(0)
     value = u()
@@ -62,9 +61,8 @@ def sample_light(
             lambda: tuple(_aim_at_triangle(scene, point, light, u)),
         )
     )
-    return LightSample(
-        light, aim.direction, aim.distance, vec3(row[0], row[1], row[2]), aim.inverse_pdf * row[3]
-    )
+    radiance = vec3(row[0], row[1], row[2])
+    return LightSample(aim.direction, aim.distance, radiance, aim.inverse_pdf * row[3])
 
 
 def inverse_pdf(scene: DeviceScene, features: Features, ray: Ray, light: UInt32, hit: Hit) -> Float:

@@ -100,10 +100,15 @@ class Primitives:
         triangles = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
         return np.concatenate([4 * np.pi * radii**2, triangles])
 
-    def light_pmf(self) -> Array:
-        """Probability of each light (n,), proportional to its power."""
+    def light_cdf(self) -> Array:
+        """Cumulative probability of the lights (n,): half by power, half the same for all.
+
+        The even half keeps a weak light that is near from being missed. All values are multiples
+        of 2⁻²⁴, as random numbers are, so that their differences are the exact probabilities.
+        """
         power = self.light_areas() * (self.radiance @ LUMINANCE)
-        return np.asarray(power / power.sum())
+        pmf = (power / power.sum() + 1 / len(power)) / 2
+        return np.asarray(np.round(np.cumsum(pmf) * 2**24) / 2**24)
 
     def blockers(self) -> list[bool]:
         """Whether each facet can stand between two points of the scene."""
