@@ -98,8 +98,8 @@ class Launcher:
                 non_finite + dr.select(finite, 0, 1),
             )
 
-        state = (replicate, types.Array3f64(0), types.UInt32(0), types.UInt32(0))
-        return dr.while_loop(state, lambda i, *_: i < samples, add_sample)[1:]
+        zeros = (dr.zeros(t, len(lane)) for t in (types.Array3f64, types.UInt32, types.UInt32))
+        return dr.while_loop((replicate, *zeros), lambda i, *_: i < samples, add_sample)[1:]
 
     def _sample(self, sampler: Sampler) -> tuple[Array3f, UInt32]:
         middle = self.tracer.scene.types.Float32(0.5)
@@ -123,6 +123,8 @@ def make_launcher(
     if len(primitives.triangles):
         types = import_module(f"{types.__name__}.ad")  # Mitsuba's, for its meshes
     features = Features.of(primitives, bounces, mode)
+    if not (features.diffuse or features.phong):
+        bounces = 0
     tracer = Tracer(upload(primitives, types), features, mode, bounces)
     camera = make_camera(scene.camera, primitives.origin, types)
     return Launcher(tracer, camera, SAMPLERS[sampler], jitter)

@@ -1,18 +1,18 @@
 """The path tracer.
 
-A path x₀ x₁ x₂ … starts at the camera's eye x₀. With ω the direction that leads on at a vertex and
-p its density, the throughput after vertex i is
+A path starts at the eye and meets the vertices x₁ x₂ …; ω_i is the direction in which it goes on
+at x_i, chosen with the density p. The throughput up to vertex i is
 
-    beta_i = ∏_{j ≤ i} f(x_j, ω_j) cos θ_j / p(ω_j),
+    beta_i = ∏_{j < i}  f(x_j, ω_j) cos θ_j / p(ω_j),
 
-and the estimate of the radiance along the first ray is, over the vertices i = 1 … bounces + 1 and
-bounces,
+and with k bounces the radiance along the first ray is estimated by
 
-    implicit    L = Σ_i  beta_{i−1} L_e(x_i)
-    explicit    L = L_e(x₁) + Σ_i  beta_{i−1} f(x_i, ω') cos θ' L_e(ω') V(ω') / p_light(ω')
-    mis         both sums, each term weighted by the power heuristic of p_light and p_brdf.
+    implicit    Σ_{i ≤ k+1}  beta_i L_e(x_i)
+    explicit    L_e(x₁) + Σ_{i ≤ k}  beta_i f(x_i, ω') cos θ' L_e(ω') V(ω') / p_light(ω')
+    mis         L_e(x₁) + both sums from there on, each term weighted by the power heuristic,
 
-(Kajiya 1986; Veach 1997, ch. 8–10.)
+where ω' leads from x_i to a sampled point of a light, and V tells whether nothing stands between
+(Kajiya 1986; Veach 1997, ch. 8–10).
 """
 
 from __future__ import annotations

@@ -107,7 +107,8 @@ class Primitives:
         of 2⁻²⁴, as random numbers are, so that their differences are the exact probabilities.
         """
         power = self.light_areas() * (self.radiance @ LUMINANCE)
-        pmf = (power / power.sum() + 1 / len(power)) / 2
+        even = np.ones_like(power)
+        pmf = (power / power.sum() + even / even.sum()) / 2
         return np.asarray(np.round(np.cumsum(pmf) * 2**24) / 2**24)
 
     def blockers(self) -> list[bool]:
