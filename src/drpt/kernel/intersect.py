@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import drjit as dr
 
@@ -12,7 +12,7 @@ from drpt.kernel.vec import vec3
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from drjit.auto import Array3f, Bool, Float, UInt32
+    from drjit.auto import Array3f, Array4f, Bool, Float, UInt32
 
     from drpt.kernel.camera import Ray
     from drpt.kernel.device_scene import DeviceScene
@@ -163,7 +163,9 @@ def _meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
 def _surface(
     scene: DeviceScene, features: Features, ray: Ray, t: Float, primitive: UInt32, valid: Bool
 ) -> Hit:
-    point, normal, reach = _on_primitive(scene, features, ray, t, primitive, valid)
+    row = scene.geometry_row(primitive, valid)
+    p = dr.fma(ray.direction, t, ray.origin)
+    point, normal, reach = _on_primitive(scene, features, row, p, primitive)
     front = dr.dot(normal, ray.direction) < 0
     facing = dr.select(front, normal, -normal)
     shading_normal = facing
@@ -173,26 +175,40 @@ def _surface(
     return Hit(valid, t, primitive, spawn, facing, shading_normal, front)
 
 
+_Place: TypeAlias = "tuple[Array3f, Array3f, Float]"
+"""A point moved onto its primitive, the normal there, and the largest coordinate in use."""
+
+
 def _on_primitive(
-    scene: DeviceScene, features: Features, ray: Ray, t: Float, primitive: UInt32, valid: Bool
-) -> tuple[Array3f, Array3f, Float]:
-    """The point at ``t`` moved onto its primitive, the normal, and the largest coordinate used."""
-    row = scene.geometry_row(primitive, valid)
-    vector = vec3(row[0], row[1], row[2])
-    p = dr.fma(ray.direction, t, ray.origin)
-    on_facet = dr.fma(vector, row[3] - dr.dot(vector, p), p)
-    outward = dr.normalize(p - vector)
-    on_sphere = dr.fma(outward, row[3], vector)
+    scene: DeviceScene, features: Features, row: Array4f, p: Array3f, primitive: UInt32
+) -> _Place:
     if not features.spheres:
-        return on_facet, vector, _largest(on_facet)
+        return _on_facet(row, p)
+    only_lights = scene.first_light == scene.first_sphere
+    on_sphere = _on_sphere_light(row, p) if only_lights else _on_sphere(row, p)
     if not features.triangles:
-        return on_sphere, outward, _largest(on_sphere) + row[3]
-    is_sphere = (primitive >= scene.first_sphere) & (
-        primitive < scene.first_sphere + scene.sphere_count
-    )
-    point = dr.select(is_sphere, on_sphere, on_facet)
-    reach = _largest(point) + dr.select(is_sphere, row[3], 0)
-    return point, dr.select(is_sphere, outward, vector), reach
+        return on_sphere
+    end = scene.first_sphere + scene.sphere_count
+    is_sphere = (primitive >= scene.first_sphere) & (primitive < end)
+    return dr.select(is_sphere, on_sphere, _on_facet(row, p))
+
+
+def _on_facet(row: Array4f, p: Array3f) -> _Place:
+    normal = vec3(row[0], row[1], row[2])
+    point = dr.fma(normal, row[3] - dr.dot(normal, p), p)
+    return point, normal, _largest(point)
+
+
+def _on_sphere(row: Array4f, p: Array3f) -> _Place:
+    center, radius = vec3(row[0], row[1], row[2]), row[3]
+    normal = dr.normalize(p - center)
+    point = dr.fma(normal, radius, center)
+    return point, normal, _largest(point) + radius
+
+
+def _on_sphere_light(row: Array4f, p: Array3f) -> _Place:
+    """What ends all paths: no more of it is asked for than its side, so any normal will do."""
+    return p, p - vec3(row[0], row[1], row[2]), _largest(p)
 
 
 def _largest(v: Array3f) -> Float:
