@@ -30,7 +30,7 @@ def to_device(values: npt.ArrayLike) -> Any:
 
 def to_host(array: Any) -> Floats:
     """Return numbers of the device as (n,), its vectors as rows (n, 2) or (n, 3)."""
-    return np.array(array, np.float64).T
+    return np.ascontiguousarray(np.array(array, np.float64).T)
 
 
 def unit_square(count: int, seed: int = 0) -> Any:

@@ -33,8 +33,8 @@ def test_frames_are_orthonormal_and_right_handed() -> None:
 
 @pytest.mark.parametrize("pole", [1, -1])
 def test_frames_are_continuous_at_the_poles(pole: int) -> None:
-    tilts = to_device([[0, 0, pole], [1e-6, -1e-6, pole], [-1e-6, 0, pole], [0, 1e-5, pole]])
-    for axis in frame(tilts):
+    tilts = np.array([(0, 0), (1e-6, -1e-6), (-1e-6, 0), (0, 1e-5)])
+    for axis in frame(to_device(np.column_stack([tilts, np.full(4, pole)]))):
         v = to_host(axis)
         np.testing.assert_allclose(v, np.tile(v[0], (4, 1)), rtol=0, atol=2e-5)
 

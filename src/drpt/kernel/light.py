@@ -137,7 +137,7 @@ def _aim_into_cone(cap: _Cap, u: Array2f) -> Aim:
 
 
 def _aim_at_triangle(scene: DeviceScene, point: Array3f, light: UInt32, u: Array2f) -> Aim:
-    index = light - scene.sphere_lights
+    index = dr.maximum(light, scene.sphere_lights) - scene.sphere_lights
     a, b, c = (dr.gather(scene.types.Array3f, scene.light_corners, 3 * index + k) for k in range(3))
     weights = square_to_triangle(u)
     target = a + weights.x * (b - a) + weights.y * (c - a)

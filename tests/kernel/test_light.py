@@ -1,0 +1,362 @@
+from dataclasses import dataclass
+from math import asin, atan2, cos, hypot, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drpt.kernel.camera import Ray
+from drpt.kernel.device_scene import DeviceScene, upload
+from drpt.kernel.estimator import Features, Mode
+from drpt.kernel.intersect import closest_hit
+from drpt.kernel.light import (
+    LightSample,
+    choose_light,
+    inverse_pdf,
+    power_heuristic,
+    sample_light,
+)
+from drpt.kernel.primitives import make_primitives
+from drpt.kernel.sampler import SobolSampler
+from drpt.kernel.warp import square_to_sphere
+from drpt.scene import Camera, Diffuse, Mesh, Scene, Shape, Sphere
+from tests.conftest import TYPES, to_device, to_host, unit_square
+from tests.kernel import polar
+from tests.oracle.arrays import Floats, basis, normalize
+from tests.oracle.closed_forms import sphere_light_irradiance
+from tests.oracle.statistics import chi2_of_counts
+
+SAMPLES = 1_000_000
+SOBOL_SAMPLES = 2**20
+SIGNIFICANCE = 1e-4  # of each statistical gate; seeds are fixed, so it fails always or never
+BIAS = 0.005  # what the means must detect; and a light's probability, where it is large
+IRRADIANCE = 1e-6  # relative, of a mean over the Sobol' points
+SOLID_ANGLE = 3e-7  # relative, of a cone; a few roundings of 6e-8
+MEAN_SOLID_ANGLE = 5e-6  # relative, of a mean over points that are uniform on a light
+AGREE = 2e-6  # relative, of the density of a sample and that of the hit it leads to
+PLACE = 4e-7  # of a point on a light, relative to its distance
+UNIT = 4e-7  # of a direction's length
+
+RATIOS = [0.98, 0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-6]  # radius by distance
+WIDE = RATIOS[:-2]  # of the other cones, rounded directions show the lattice that they are on
+GAPS = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7]  # distance / radius - 1
+ENDS = [0, 2.0**-24, 0.5, 1 - 2.0**-24]
+
+CAMERA = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), fov=40, width=4, height=4)
+FLOOR = Mesh([(-9, -9, -9), (9, -9, -9), (0, 9, -9)], [(0, 1, 2)], material=Diffuse(0.5))
+TRIANGLE = Mesh([(-1, -0.5, 2), (0.2, 1.5, 3), (1, -1, 2.5)], [(0, 1, 2)], radiance=(2, 1, 0.5))
+SPHERE = Sphere((0.5, -0.3, 2), 0.7, radiance=(4, 6, 8))
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+@dataclass
+class Lights:
+    """Lights on the device; spheres come first, as the kernel numbers them."""
+
+    scene: DeviceScene
+    features: Features
+    mode: Mode
+
+    @classmethod
+    def of(cls, *lights: Shape, mode: Mode = Mode.MIS) -> "Lights":
+        primitives = make_primitives(Scene(CAMERA, [FLOOR, *lights]))
+        return cls(upload(primitives, TYPES), Features.of(primitives, 1, mode), mode)
+
+    def sample(self, u: Any, *, light: int = 0, point: Any = ORIGIN) -> LightSample:
+        """Sample a light from one point or from many (n, 3)."""
+        points = to_device(np.atleast_2d(point))
+        number = TYPES.UInt32([light])
+        return sample_light(self.scene, self.features, self.mode, points, number, u)
+
+    def inverse_pdf_of_hits(self, direction: Any, light: int) -> tuple[Floats, Any]:
+        """Return 1 / density of rays from the origin, and where they hit that light."""
+        ray = Ray(to_device([ORIGIN]), direction)
+        hit = closest_hit(self.scene, self.features, ray, TYPES.Bool([True]))
+        number = TYPES.UInt32([light])
+        found = np.array(hit.valid & (hit.primitive == self.scene.first_light + number))
+        return to_host(inverse_pdf(self.scene, self.features, ray, number, hit)), found
+
+
+def sobol() -> Any:
+    index = TYPES.UInt32(np.arange(SOBOL_SAMPLES, dtype=np.uint32))
+    return SobolSampler(TYPES.UInt32([0]), index, TYPES.UInt32([0])).next_2d(0)
+
+
+def rounded(values: Any) -> Any:
+    """Return values as float32 has them."""
+    return np.asarray(values, np.float32).astype(np.float64)
+
+
+def sphere_at(omega: float, ratio: float) -> tuple[Sphere, float]:
+    """Return a sphere light with its centre at the angle ω from +z, and its half-angle σ."""
+    center = rounded([2 * sin(omega), 0, 2 * cos(omega)])
+    radius = float(rounded(2 * ratio))
+    return Sphere(center, radius, radiance=1), asin(radius / hypot(*center))
+
+
+def cone_solid_angle(sigma: float) -> float:
+    return 4 * pi * sin(sigma / 2) ** 2
+
+
+def triangle_solid_angle(corners: Floats) -> float:
+    """Return the solid angle of a triangle (3, 3) from 0 (Van Oosterom & Strackee 1983)."""
+    a, b, c = corners
+    la, lb, lc = np.linalg.norm(corners, axis=1)
+    determinant = abs(float(a @ np.cross(b, c)))
+    return 2 * atan2(determinant, la * lb * lc + a @ b * lc + a @ c * lb + b @ c * la)
+
+
+class TestCone:
+    @pytest.mark.parametrize("ratio", RATIOS)
+    def test_directions_end_on_the_light(self, ratio: float) -> None:
+        light, sigma = sphere_at(0.3, ratio)
+        sample = Lights.of(light).sample(unit_square(100_000))
+        direction, distance = to_host(sample.direction), to_host(sample.distance)
+        np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, rtol=0, atol=UNIT)
+        to_center = direction * distance[:, None] - light.center
+        off = np.linalg.norm(to_center, axis=1) - light.radius
+        np.testing.assert_allclose(off, 0, rtol=0, atol=2 * PLACE)
+        away = np.linalg.norm(np.cross(direction, normalize(np.array([light.center]))), axis=1)
+        assert away.max() < sin(sigma) + UNIT
+        assert (distance <= sqrt(4 - light.radius**2) * (1 + PLACE)).all()
+
+    @pytest.mark.parametrize("ratio", RATIOS)
+    def test_inverse_pdf_is_the_solid_angle(self, ratio: float) -> None:
+        light, sigma = sphere_at(0.3, ratio)
+        sample = Lights.of(light).sample(unit_square(1000))
+        solid_angle = to_host(sample.inverse_pdf)
+        np.testing.assert_allclose(solid_angle, cone_solid_angle(sigma), rtol=SOLID_ANGLE)
+
+    @pytest.mark.parametrize("gap", GAPS)
+    def test_receiver_close_to_the_light(self, gap: float) -> None:
+        distance = float(rounded(1 + gap))
+        sample = Lights.of(Sphere((0, 0, distance), 1, radiance=1)).sample(unit_square(1000))
+        cosine = sqrt((distance - 1) * (distance + 1)) / distance
+        solid_angle = 2 * pi * (1 - cosine)
+        np.testing.assert_allclose(to_host(sample.inverse_pdf), solid_angle, rtol=SOLID_ANGLE)
+        end = to_host(sample.direction) * to_host(sample.distance)[:, None] - (0, 0, distance)
+        np.testing.assert_allclose(np.linalg.norm(end, axis=1), 1, rtol=0, atol=PLACE)
+
+    @pytest.mark.parametrize("point", [(0, 0, 1), (0, 0, 1.9), (0.5, 0, 1)])
+    def test_light_is_dark_from_inside(self, point: tuple[float, float, float]) -> None:
+        sample = Lights.of(Sphere((0, 0, 1), 1, radiance=1)).sample(unit_square(1000), point=point)
+        assert (to_host(sample.inverse_pdf) == 0).all()
+
+    @pytest.mark.parametrize("ratio", RATIOS)
+    @pytest.mark.parametrize("omega", [0.0, 0.3, pi / 2])
+    def test_irradiance(self, ratio: float, omega: float) -> None:
+        """At ω = 90° a light is half below the horizon; at 0.3 the widest one is, in part."""
+        light, sigma = sphere_at(omega, ratio)
+        x, _, z = light.center
+        expected = sphere_light_irradiance(1, sigma, atan2(x, z))
+        if omega > 1 and sigma < 1e-3:  # there the closed form cancels; half of a flat disc
+            expected = 2 / 3 * sigma**3
+        sample = Lights.of(light).sample(sobol())
+        cosine = np.maximum(to_host(sample.direction)[:, 2], 0)
+        irradiance = (to_host(sample.inverse_pdf) * cosine).mean()
+        assert irradiance == pytest.approx(expected, rel=IRRADIANCE)
+
+    def test_irradiance_detects_a_bias(self) -> None:
+        light, sigma = sphere_at(0.3, 0.1)
+        sample = Lights.of(light).sample(sobol())
+        cosine = to_host(sample.direction)[:, 2]
+        irradiance = (to_host(sample.inverse_pdf) * cosine).mean()
+        biased = (1 + BIAS) * sphere_light_irradiance(1, sigma, 0.3)
+        assert irradiance != pytest.approx(biased, rel=IRRADIANCE)
+
+    @pytest.mark.parametrize("ratio", WIDE)
+    def test_directions_are_uniform_in_the_cone(self, ratio: float) -> None:
+        assert self._p_value(ratio, ratio) > SIGNIFICANCE
+
+    @pytest.mark.parametrize("ratio", WIDE)
+    def test_chi2_detects_a_cone_that_is_too_wide(self, ratio: float) -> None:
+        assert self._p_value(ratio, ratio * (1 + BIAS)) < SIGNIFICANCE
+
+    @staticmethod
+    def _p_value(ratio: float, drawn: float) -> float:
+        light, sigma = sphere_at(0.3, ratio)
+        turned = basis(normalize(np.array([light.center])))[0]
+        sample = Lights.of(sphere_at(0.3, drawn)[0]).sample(unit_square(SAMPLES))
+        inverse = to_host(Lights.of(light).sample(unit_square(1)).inverse_pdf)
+        edges = 2 * sin(sigma / 2) ** 2 * np.linspace(0, 1, polar.CELLS + 1)
+        uniform = lambda below, _: np.broadcast_to(1 / inverse, below.shape)  # noqa: E731
+        local = np.einsum("nc,kc->nk", to_host(sample.direction), turned)
+        return polar.p_value(local, uniform, edges)
+
+    @pytest.mark.parametrize("ratio", RATIOS)
+    @pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -1), (0, 1, 0)])
+    def test_ends_of_the_unit_interval(self, ratio: float, axis: tuple[int, int, int]) -> None:
+        light = Sphere(2 * np.array(axis), 2 * ratio, radiance=1)
+        sample = Lights.of(light).sample(to_device([(x, y) for x in ENDS for y in ENDS]))
+        direction, distance = to_host(sample.direction), to_host(sample.distance)
+        np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, rtol=0, atol=UNIT)
+        assert (direction @ axis > 0).all()
+        assert ((distance > 0) & (distance <= 2)).all()
+
+
+class TestArea:
+    """Points uniform on a light: the mean of 1 / density is the solid angle."""
+
+    @pytest.mark.parametrize("ratio", [0.9, 0.5, 0.1, 1e-2, 1e-3])
+    def test_sphere(self, ratio: float) -> None:
+        light, sigma = sphere_at(0.3, ratio)
+        sample = Lights.of(light, mode=Mode.EXPLICIT_UNIFORM).sample(sobol())
+        mean = to_host(sample.inverse_pdf).mean()
+        expected = cone_solid_angle(sigma)
+        assert mean == pytest.approx(expected, rel=MEAN_SOLID_ANGLE)
+        assert mean != pytest.approx(expected * (1 + BIAS), rel=MEAN_SOLID_ANGLE)
+
+    def test_irradiance_of_a_sphere_half_below_the_horizon(self) -> None:
+        light, sigma = sphere_at(pi / 2, 0.5)
+        sample = Lights.of(light, mode=Mode.EXPLICIT_UNIFORM).sample(sobol())
+        cosine = np.maximum(to_host(sample.direction)[:, 2], 0)
+        irradiance = (to_host(sample.inverse_pdf) * cosine).mean()
+        expected = sphere_light_irradiance(1, sigma, pi / 2)
+        assert irradiance == pytest.approx(expected, rel=MEAN_SOLID_ANGLE)
+
+    @pytest.mark.parametrize("scale", [1.0, 100.0])
+    def test_triangle(self, scale: float) -> None:
+        corners = rounded(TRIANGLE.vertices * (1, 1, scale))
+        light = Mesh(corners, [(0, 1, 2)], radiance=1)
+        sample = Lights.of(light).sample(sobol())
+        mean = to_host(sample.inverse_pdf).mean()
+        expected = triangle_solid_angle(corners)
+        assert mean == pytest.approx(expected, rel=MEAN_SOLID_ANGLE)
+        assert mean != pytest.approx(expected * (1 + BIAS), rel=MEAN_SOLID_ANGLE)
+
+    def test_triangle_is_dark_from_behind(self) -> None:
+        sample = Lights.of(TRIANGLE).sample(unit_square(1000), point=(0, 0, 5))
+        assert (to_host(sample.inverse_pdf) == 0).all()
+
+    def test_directions_end_on_the_triangle(self) -> None:
+        sample = Lights.of(TRIANGLE).sample(unit_square(100_000))
+        direction, distance = to_host(sample.direction), to_host(sample.distance)
+        np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, rtol=0, atol=UNIT)
+        weights = (direction * distance[:, None]) @ np.linalg.inv(TRIANGLE.vertices)
+        np.testing.assert_allclose(weights.sum(axis=1), 1, rtol=0, atol=5 * PLACE)
+        assert weights.min() > -5 * PLACE
+
+    @pytest.mark.parametrize("light", [SPHERE, TRIANGLE])
+    def test_ends_of_the_unit_interval(self, light: Shape) -> None:
+        lights = Lights.of(light, mode=Mode.EXPLICIT_UNIFORM)
+        sample = lights.sample(to_device([(x, y) for x in ENDS for y in ENDS]))
+        direction = to_host(sample.direction)
+        np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, rtol=0, atol=UNIT)
+        assert np.isfinite(to_host(sample.inverse_pdf)).all()
+
+
+MANY: list[Shape] = [
+    *(Sphere((x, 0, 3), 0.1 + 0.02 * x, radiance=(1 + x, 2, 1 / (1 + x))) for x in np.arange(20.0)),
+    Sphere((0, 5, 3), 0.01, radiance=1e4),
+    Sphere((0, 8, 3), 1, radiance=1e-6),
+    TRIANGLE,
+    Mesh(TRIANGLE.vertices[[0, 2, 1]] + 9, [(0, 1, 2)], radiance=7),
+]
+
+
+def probabilities(lights: list[Shape]) -> Floats:
+    """Return the probability of each light: half by power, area × luminance, half even."""
+    areas = [
+        4 * pi * light.radius**2 if isinstance(light, Sphere) else light.areas().sum()
+        for light in lights
+    ]
+    radiance = np.array([light.radiance for light in lights], np.float64)
+    power = np.array(areas) * (radiance @ [0.2126, 0.7152, 0.0722])
+    return np.asarray((power / power.sum() + 1 / len(lights)) / 2)
+
+
+class TestChoice:
+    def test_follows_the_probabilities(self) -> None:
+        p_value = chi2_of_counts(self._counts(MANY), SAMPLES * probabilities(MANY)).p_value
+        assert p_value > SIGNIFICANCE
+
+    def test_chi2_detects_a_bias(self) -> None:
+        expected = probabilities(MANY)
+        expected[np.argsort(expected)[::2]] *= 1 + 4 * BIAS
+        p_value = chi2_of_counts(self._counts(MANY), SAMPLES * expected / expected.sum()).p_value
+        assert p_value < SIGNIFICANCE
+
+    def test_of_a_thousand_lights(self) -> None:
+        rng = np.random.default_rng(8)
+        radiances = 10 ** rng.uniform(-2, 2, 1000)
+        lights: list[Shape] = [
+            Sphere((i % 40, i // 40, 0), 0.3, radiance=L) for i, L in enumerate(radiances)
+        ]
+        p_value = chi2_of_counts(self._counts(lights), SAMPLES * probabilities(lights)).p_value
+        assert p_value > SIGNIFICANCE
+
+    def test_ends_of_the_unit_interval(self) -> None:
+        lights = Lights.of(*MANY)
+        ends = to_device([0, 1 - 2.0**-24])
+        chosen = np.array(choose_light(lights.scene, lights.features, lambda: ends))
+        assert chosen.tolist() == [0, len(MANY) - 1]
+
+    def test_of_a_single_light_asks_for_no_number(self) -> None:
+        lights = Lights.of(SPHERE)
+
+        def refuse() -> Any:
+            raise AssertionError
+
+        assert np.array(choose_light(lights.scene, lights.features, refuse)).tolist() == [0]
+
+    @staticmethod
+    def _counts(shapes: list[Shape]) -> Floats:
+        lights, u = Lights.of(*shapes), unit_square(SAMPLES).x
+        chosen = np.array(choose_light(lights.scene, lights.features, lambda: u))
+        return np.bincount(chosen, minlength=len(shapes)).astype(np.float64)
+
+
+class TestSampleOfMany:
+    @pytest.mark.parametrize("number", [0, 7, 20, 22, 23])
+    def test_is_that_of_the_light_alone_by_its_probability(self, number: int) -> None:
+        u, pmf = unit_square(1000), probabilities(MANY)[number]
+        many = Lights.of(*MANY).sample(u, light=number)
+        alone = Lights.of(MANY[number]).sample(u)
+        for a, b in (
+            (many.direction, alone.direction),
+            (many.distance, alone.distance),
+            (pmf * many.inverse_pdf, alone.inverse_pdf),
+        ):
+            np.testing.assert_allclose(to_host(a), to_host(b), rtol=2 * AGREE, atol=UNIT)
+        np.testing.assert_allclose(to_host(many.radiance)[0], MANY[number].radiance or 0, rtol=1e-7)
+
+
+class TestInversePdf:
+    @pytest.mark.parametrize("number", [0, 1])
+    def test_at_a_hit_is_that_of_the_sample(self, number: int) -> None:
+        away = Mesh(TRIANGLE.vertices + np.array([5, 0, 0]), [(0, 1, 2)], radiance=(2, 1, 0.5))
+        lights = Lights.of(SPHERE, away)
+        sample = lights.sample(unit_square(100_000), light=number)
+        inverse, found = lights.inverse_pdf_of_hits(sample.direction, number)
+        assert found.mean() > 0.999  # rounding lets a few miss the rim
+        expected = np.broadcast_to(to_host(sample.inverse_pdf), inverse.shape)
+        np.testing.assert_allclose(inverse[found], expected[found], rtol=AGREE)
+
+    @pytest.mark.parametrize("ratio", RATIOS[1:-1])
+    def test_of_a_cone_is_its_solid_angle(self, ratio: float) -> None:
+        light, sigma = sphere_at(0.3, ratio)
+        lights = Lights.of(light)
+        direction = to_device(normalize(np.array([light.center])))
+        inverse, found = lights.inverse_pdf_of_hits(direction, 0)
+        assert found.all()
+        np.testing.assert_allclose(inverse, cone_solid_angle(sigma), rtol=SOLID_ANGLE)
+
+    @pytest.mark.parametrize("light", [SPHERE, TRIANGLE])
+    def test_density_integrates_to_one(self, light: Shape) -> None:
+        directions = square_to_sphere(sobol())
+        inverse, found = Lights.of(light).inverse_pdf_of_hits(directions, 0)
+        density = np.where(found, 1 / np.where(found, inverse, 1), 0)
+        assert 4 * pi * density.mean() == pytest.approx(1, abs=BIAS / 5)
+
+
+class TestPowerHeuristic:
+    def test_weights_of_both_techniques_sum_to_one(self) -> None:
+        ratio = np.geomspace(1e-18, 1e18, 1001)
+        weight = to_host(power_heuristic(to_device(ratio)))
+        other = to_host(power_heuristic(to_device(1 / ratio)))
+        np.testing.assert_allclose(weight + other, 1, rtol=3e-7)
+        np.testing.assert_allclose(weight, 1 / (1 + ratio**2), rtol=5e-7, atol=1e-37)
+
+    def test_where_one_technique_never_or_always_finds_a_direction(self) -> None:
+        weight = to_host(power_heuristic(to_device([0, 1e-30, 1, 1e30, np.inf])))
+        np.testing.assert_array_equal(weight, [1, 1, 0.5, 0, 0])
