@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.mitsuba_scene import make_scene
 from drpt import load_scene, render
-from drpt.kernel import backend
+from drpt.crosscheck import to_mitsuba
 from drpt.render import SAMPLERS
 
 if TYPE_CHECKING:
@@ -28,11 +27,8 @@ def main() -> None:
     """Print a line for each renderer, and the ratios."""
     args = _arguments()
     scene = load_scene(args.scene)
-    backend.load("llvm")  # chooses the LLVM library that Mitsuba uses as well
+    reference = to_mitsuba(scene, args.bounces)
     import mitsuba as mi
-
-    mi.set_variant("llvm_ad_rgb")
-    reference = make_scene(mi, scene, args.bounces)
 
     def in_mitsuba(seed: int) -> Any:
         return np.array(mi.render(reference, spp=args.spp, seed=mi.UInt32(seed)))
@@ -63,7 +59,7 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
-    parser.add_argument("--scene", default="cornell-box", help="of diffuse surfaces")
+    parser.add_argument("--scene", default="cornell-box")
     parser.add_argument("--spp", type=int, default=256)
     parser.add_argument("--bounces", type=int, default=2)
     parser.add_argument("--mode", default="explicit")

@@ -317,7 +317,8 @@ class TestSampleOfMany:
             (many.distance, alone.distance),
             (pmf * many.inverse_pdf, alone.inverse_pdf),
         ):
-            np.testing.assert_allclose(to_host(a), to_host(b), rtol=2 * AGREE, atol=UNIT)
+            many_values, expected = np.broadcast_arrays(to_host(a), to_host(b))
+            np.testing.assert_allclose(many_values, expected, rtol=2 * AGREE, atol=UNIT)
         np.testing.assert_allclose(to_host(many.radiance)[0], MANY[number].radiance or 0, rtol=1e-7)
 
 
