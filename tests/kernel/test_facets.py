@@ -83,7 +83,7 @@ def test_corners_along_straight_edges_vanish() -> None:
 
 @pytest.mark.parametrize("lift", [1e-6, 1e-3, 1.0])
 def test_a_bent_quad_stays_two_triangles(lift: float) -> None:
-    bent = SQUARE + [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, lift]]
+    bent = SQUARE + np.array([0, 0, 0, lift])[:, None] * [0, 0, 1]
     assert len(merge_coplanar(bent[QUAD])) == 2
 
 
@@ -137,7 +137,7 @@ def test_a_grid_becomes_few_polygons_of_the_same_area() -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_slabs_hold_the_polygon_and_nothing_else(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    corners = random_polygon(rng, rng.integers(3, 7))
+    corners = random_polygon(rng, int(rng.integers(3, 7)))
     weights = rng.dirichlet(np.full(len(corners), 0.4), 4000)
     centre = corners.mean(axis=0)
     points = centre + rng.uniform(0, 2, (4000, 1)) * (weights @ corners - centre)

@@ -87,13 +87,15 @@ def test_shape_of_no_radiance_is_black() -> None:
     assert len(found.radiance) == 0
 
 
-def test_lights_are_chosen_by_their_power() -> None:
+def test_lights_are_chosen_half_by_power_half_evenly() -> None:
     colour = (1.0, 2.0, 4.0)
     found = prepare(drpt.Sphere((4, 0, 0), 0.5, radiance=colour), quad(radiance=3))
     sphere = 4 * np.pi * 0.5**2
     assert found.light_areas() == pytest.approx([sphere, 0.5, 0.5], rel=ROUNDING)
     power = np.array([sphere * (LUMINANCE @ colour), 1.5, 1.5])
-    assert found.light_pmf() == pytest.approx(power / power.sum(), rel=ROUNDING)
+    pmf = np.diff(found.light_cdf(), prepend=0)
+    assert pmf == pytest.approx((power / power.sum() + 1 / 3) / 2, abs=2.0**-23)
+    assert pmf.sum() == 1
 
 
 def test_a_quad_is_one_facet_and_meshes_stay_apart() -> None:
@@ -117,11 +119,12 @@ def test_smooth_and_emitting_triangles_are_not_merged() -> None:
 
 @pytest.mark.parametrize("kind", ["flat", "smooth", "light"])
 def test_triangles_without_area_are_dropped(kind: str) -> None:
-    given: dict[str, Any] = {
+    kinds: dict[str, dict[str, Any]] = {
         "flat": {"material": WHITE},
         "smooth": {"material": WHITE, "normals": [[0, 0, 1]] * 4},
         "light": {"radiance": 1},
-    }[kind]
+    }
+    given = kinds[kind]
     found = prepare(drpt.Mesh(SQUARE, [[0, 1, 1], [0, 1, 2], [3, 3, 3]], **given))
     assert len(found.planes) == 1
     assert len(found.reflectance) + len(found.radiance) == 1

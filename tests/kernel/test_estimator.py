@@ -1,0 +1,124 @@
+"""Names of modes, what they do, and what of a scene a kernel needs."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import pytest
+
+import drpt
+from drpt.kernel.estimator import Features, Mode
+from drpt.kernel.primitives import make_primitives
+
+if TYPE_CHECKING:
+    from drpt.scene import Shape
+
+CAMERA = drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 40, 8, 8)
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+DIFFUSE, PHONG = drpt.Diffuse(0.5), drpt.Phong(0.5, 9)
+BALL = drpt.Sphere((0, 0, 3), 1, material=DIFFUSE)
+TRIANGLE = drpt.Mesh(CORNERS, [[0, 1, 2]], material=DIFFUSE)
+SMOOTH = drpt.Mesh(CORNERS, [[0, 1, 2]], [[0, 0, 1]] * 3, material=PHONG)
+LAMP = drpt.Sphere((0, 0, 7), 1, radiance=1)
+PANEL = drpt.Mesh(CORNERS, [[0, 1, 2]], radiance=1)
+
+COURSE_NAMES = {
+    "IMPLICIT_UNIFORM_SAMPLING": "implicit-uniform",
+    "IMPLICIT_BRDF_SAMPLING": "implicit",
+    "EXPLICIT_UNIFORM_SAMPLING": "explicit-uniform",
+    "EXPLICIT_LIGHT_BRDF_SAMPLING": "explicit",
+}
+
+
+def features(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> set[str]:
+    """Names of the features that the kernel of a scene has."""
+    primitives = make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes))
+    found = asdict(Features.of(primitives, bounces, Mode(mode)))
+    return {name for name, on in found.items() if on}
+
+
+def test_there_are_five_modes() -> None:
+    names = ["implicit-uniform", "implicit", "explicit-uniform", "explicit", "mis"]
+    assert [str(mode) for mode in Mode] == names
+    assert drpt.Mode is Mode
+    assert all(Mode(name) == name for name in names)
+
+
+@pytest.mark.parametrize(("course", "name"), COURSE_NAMES.items())
+def test_the_names_of_the_course_are_the_same_modes(course: str, name: str) -> None:
+    assert Mode(course) is Mode(name)
+    assert getattr(Mode, course) is Mode(name)
+    assert Mode[course] is Mode(name)
+
+
+@pytest.mark.parametrize("name", ["", "EXPLICIT ", "brdf", "samples_brdf", "value", 3, None])
+def test_other_names_are_refused(name: object) -> None:
+    with pytest.raises(ValueError, match="is not a valid Mode"):
+        Mode(name)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("mode", "samples_brdf", "samples_lights", "samples_cones", "counts_hits"),
+    [
+        ("implicit-uniform", False, False, False, True),
+        ("implicit", True, False, False, True),
+        ("explicit-uniform", False, True, False, False),
+        ("explicit", True, True, True, False),
+        ("mis", True, True, True, True),
+    ],
+)
+def test_what_modes_do(
+    mode: str, samples_brdf: bool, samples_lights: bool, samples_cones: bool, counts_hits: bool
+) -> None:
+    found = Mode(mode)
+    assert found.samples_brdf is samples_brdf
+    assert found.samples_lights is samples_lights
+    assert found.samples_cones is samples_cones
+    assert found.counts_hits is counts_hits
+
+
+def test_a_scene_of_everything_has_all_features() -> None:
+    everything = set(Features.__dataclass_fields__)
+    assert features(BALL, TRIANGLE, SMOOTH, LAMP, PANEL) == everything
+
+
+def test_spheres_alone() -> None:
+    found = features(BALL, LAMP)
+    assert found == {"spheres", "diffuse", "emission", "direct_light", "sphere_lights", "mis"}
+
+
+def test_triangles_alone() -> None:
+    found = features(TRIANGLE, PANEL)
+    assert found == {"triangles", "diffuse", "emission", "direct_light", "triangle_lights", "mis"}
+
+
+def test_each_feature_needs_its_cause() -> None:
+    assert "phong" not in features(BALL, LAMP)
+    assert "diffuse" not in features(SMOOTH, LAMP)
+    assert "interpolated_normals" in features(SMOOTH, LAMP)
+    assert "interpolated_normals" not in features(SMOOTH, LAMP, bounces=0)
+    assert "light_choice" in features(BALL, LAMP, PANEL)
+    assert "light_choice" not in features(BALL, LAMP, PANEL, mode="implicit")
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_without_light_nothing_is_left(mode: str) -> None:
+    assert features(BALL, TRIANGLE, SMOOTH, mode=mode) == set()
+    assert features(BALL, drpt.Sphere((0, 0, 7), 1, radiance=0), mode=mode) == set()
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_without_bounces_or_surfaces_only_emission_is_left(mode: str) -> None:
+    emission = {"spheres", "triangles", "emission"}
+    assert features(BALL, TRIANGLE, LAMP, bounces=0, mode=mode) == emission
+    assert features(LAMP, PANEL, mode=mode) == emission
+
+
+@pytest.mark.parametrize("mode", ["implicit", "implicit-uniform"])
+def test_implicit_modes_sample_no_light(mode: str) -> None:
+    assert not features(BALL, LAMP, mode=mode) & {"direct_light", "sphere_lights", "mis"}
+
+
+def test_only_mis_weighs() -> None:
+    assert [mode for mode in Mode if "mis" in features(BALL, LAMP, mode=mode)] == [Mode.MIS]

@@ -1,0 +1,142 @@
+"""The house: which module may import what, and what `import drpt` must not load."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import drpt
+
+PACKAGE = Path(drpt.__file__).parent
+
+ORDER = ("scene", "kernel", "film", "output", "render")
+"""What data flows along, and imports against: none of these knows a later one."""
+HEAVY = {"drjit", "mitsuba"}
+
+
+class Import(NamedTuple):
+    """A module that is imported, and whether only where a function asks for it."""
+
+    module: str
+    lazy: bool
+    typing: bool
+
+
+def imports(path: Path) -> list[Import]:
+    """All imports of a file, those of types alone told apart."""
+    found: list[Import] = []
+
+    def visit(node: ast.AST, lazy: bool, typing: bool) -> None:
+        if isinstance(node, ast.Import):
+            found.extend(Import(alias.name, lazy, typing) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute"
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                found.append(Import(name if is_module(name) else str(node.module), lazy, typing))
+        lazy = lazy or isinstance(node, ast.FunctionDef | ast.Lambda)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            typing = True
+        for child in ast.iter_child_nodes(node):
+            visit(child, lazy, typing)
+
+    visit(ast.parse(path.read_text(encoding="utf-8")), lazy=False, typing=False)
+    return found
+
+
+def is_module(name: str) -> bool:
+    file = PACKAGE.parent / Path(*name.split("."))
+    return file.with_suffix(".py").exists() or (file / "__init__.py").exists()
+
+
+def part_of(module: str) -> str:
+    """The part of the package a module belongs to; "" is the package itself."""
+    return module.split(".")[1] if "." in module else ""
+
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+PARTS = {path: path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in FILES}
+
+
+def names(path: Path) -> str:
+    return path.relative_to(PACKAGE).as_posix()
+
+
+@pytest.mark.parametrize("path", FILES, ids=names)
+def test_imports_run_against_the_flow_of_data(path: Path) -> None:
+    part = PARTS[path]
+    if part not in ORDER:
+        pytest.skip("stands on top")
+    allowed = {part, *ORDER[: ORDER.index(part)]}
+    if part in ("film", "output"):
+        allowed = {part}  # they are given arrays
+    used = {part_of(i.module) for i in imports(path) if i.module.split(".")[0] == "drpt"}
+    assert used <= allowed
+
+
+@pytest.mark.parametrize("path", FILES, ids=names)
+def test_only_the_kernel_knows_drjit(path: Path) -> None:
+    """And what is Mitsuba's own, beside an import of it."""
+    used = [i for i in imports(path) if i.module.split(".")[0] == "drjit"]
+    if PARTS[path] == "crosscheck":
+        assert all(i.lazy or i.typing for i in used)
+    elif PARTS[path] != "kernel":
+        assert not used
+
+
+@pytest.mark.parametrize("path", FILES, ids=names)
+def test_mitsuba_is_imported_only_where_it_is_asked_for(path: Path) -> None:
+    assert all(i.lazy or i.typing for i in imports(path) if i.module.split(".")[0] == "mitsuba")
+
+
+@pytest.mark.parametrize("path", FILES, ids=names)
+def test_nothing_below_knows_the_command_line(path: Path) -> None:
+    if PARTS[path] in ("cli", "__main__"):
+        return
+    assert "cli" not in {part_of(i.module) for i in imports(path)}
+
+
+@pytest.mark.parametrize("path", FILES, ids=names)
+def test_kernels_know_neither_files_nor_pictures(path: Path) -> None:
+    if PARTS[path] == "kernel":
+        used = {i.module.split(".")[0] for i in imports(path)}
+        assert not used & {"OpenEXR", "PIL", "rich", "trimesh", "tomllib", "tomli_w"}
+
+
+def test_the_check_sees_what_is_forbidden(tmp_path: Path) -> None:
+    file = tmp_path / "sample.py"
+    file.write_text(
+        "import drjit as dr\n"
+        "from drpt.kernel import path\n"
+        "from drpt import render\n"
+        "def f():\n    import mitsuba.python\n"
+        "if TYPE_CHECKING:\n    from drpt.scene import Scene\n"
+    )
+    assert imports(file) == [
+        Import("drjit", lazy=False, typing=False),
+        Import("drpt.kernel.path", lazy=False, typing=False),
+        Import("drpt.render", lazy=False, typing=False),
+        Import("mitsuba.python", lazy=True, typing=False),
+        Import("drpt.scene", lazy=False, typing=True),
+    ]
+
+
+@pytest.mark.parametrize("module", ["drpt", "drpt.cli", "drpt.scene"])
+def test_importing_loads_nothing_heavy(module: str) -> None:
+    code = f"import sys, {module}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.split(".")[0] for name in done.stdout.split()}
+    assert "drpt" in loaded
+    assert not loaded & HEAVY
+
+
+def test_the_scene_loads_no_other_part() -> None:
+    code = "import sys, drpt.scene.model; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "drpt.scene.model" in done.stdout.split()
+    assert not set(done.stdout.split()) & {"drjit", "mitsuba", "drpt.kernel.path"}

@@ -1,0 +1,268 @@
+"""Modes, samplers, scales and pass plans: whatever must not change a picture."""
+
+from __future__ import annotations
+
+import sys
+from itertools import combinations
+from math import log2
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import drpt
+from drpt.scene import builtin_names
+from tests.measuring import (
+    Measured,
+    assert_agree,
+    measure,
+    measure_to,
+    with_picture,
+    with_radiance,
+)
+
+if TYPE_CHECKING:
+    from drpt.scene import Shape
+    from tests.oracle.arrays import Floats
+
+MODES = tuple(drpt.Mode)
+PATHS = 2**24
+# The bias of a picture's reflected light, relative to its mean, that is seen with so many paths in
+# the order of MODES. Paths find a small light by chance only, a sharp plate hardly by a uniform
+# direction, and in `veach` a sharp plate's light is not found by sampling lights: there the modes
+# are compared as far as it goes, and the closed forms decide.
+DETECTABLE = {
+    "cornell-box": (0.03, 0.015, 0.018, 0.002, 0.002),
+    "cornell-box-glossy": (0.1, 0.015, 0.03, 0.01, 0.004),
+    "cornell-box-medium-light": (0.07, 0.03, 0.012, 0.002, 0.002),
+    "cornell-box-small-light": (0.2, 0.1, 0.01, 0.002, 0.002),
+    "furnace": (0.008, 0.003, 0.006, 0.001, 0.001),
+    "many-lights": (0.08, 0.02, 0.2, 0.05, 0.01),
+    "spheres": (0.5, 0.03, 0.07, 0.05, 0.015),
+    "veach": (0.9, 0.015, 0.6, 0.6, 0.01),
+}
+MARGIN = 1.2  # of what is detected, since the noise itself is estimated
+# For changes of a scene that leave its picture as it is, in mode mis.
+UNCHANGED = 0.01
+
+# Of `cornell-box` with 2 bounces, measured with Mitsuba's path integrator, and how far off the
+# estimate may be.
+CORNELL_MEAN = (0.89779, 0.90146, 0.82165)
+CORNELL_TOLERANCE = 5e-4
+
+
+def assert_modes_agree(name: str, paths: int) -> None:
+    scene = with_picture(drpt.load_scene(name), 48, 32)
+    found = [measure(scene, paths, 2, mode, reflected=True) for mode in MODES]
+    detectable = np.sqrt(PATHS / paths) * np.array(DETECTABLE[name])
+    for a, b in combinations(range(len(MODES)), 2):
+        assert_agree(found[a], found[b], MARGIN * np.hypot(detectable[a], detectable[b]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DETECTABLE)
+def test_modes_agree(name: str) -> None:
+    assert_modes_agree(name, PATHS)
+
+
+@pytest.mark.parametrize("name", ["cornell-box", "furnace"])
+def test_modes_agree_as_far_as_few_paths_tell(name: str) -> None:
+    assert_modes_agree(name, PATHS // 8)
+
+
+def test_every_builtin_scene_is_compared() -> None:
+    assert sorted(DETECTABLE) == sorted(builtin_names())
+
+
+def test_the_comparison_sees_a_bias() -> None:
+    scene = with_picture(drpt.load_scene("cornell-box"), 48, 32)
+    truth = measure_to(0.004, scene, 2, "mis", reflected=True)
+    biased = measure_to(0.004, with_radiance(scene, 1.01), 2, "explicit", reflected=True)
+    with pytest.raises(AssertionError, match="means differ"):
+        assert_agree(biased, truth, 0.01)
+
+
+def test_light_that_is_seen_directly_is_the_same_in_every_mode() -> None:
+    scene = with_picture(drpt.load_scene("many-lights"), 48, 32)
+    pictures = [drpt.render(scene, 16, 0, mode).image for mode in MODES]
+    assert pictures[0].any()
+    assert all(np.array_equal(picture, pictures[0]) for picture in pictures)
+
+
+def test_cornell_box_has_the_mean_that_mitsuba_gives() -> None:
+    scene = drpt.load_scene("cornell-box")
+    a, b = (
+        drpt.render(scene, 256, 2, "explicit", seed=seed).image.mean((0, 1), np.float64)
+        for seed in (1, 2)
+    )
+    assert np.abs(a - b).max() < CORNELL_TOLERANCE / 2  # what is left of noise
+    assert (a + b) / 2 == pytest.approx(CORNELL_MEAN, rel=CORNELL_TOLERANCE)
+
+
+def small_scene(shapes: list[Shape] | None = None) -> drpt.Scene:
+    """A bit of everything: both materials and kinds of lights, smooth and flat triangles."""
+    camera = drpt.Camera((0.2, -4, 1.5), (0, 0, 0.6), (0, 0, 1), 45, 48, 32)
+    return drpt.Scene(camera=camera, shapes=shapes or [*reflecting(), *lights()])
+
+
+def reflecting() -> list[Shape]:
+    floor = [[-3, -5, 0], [3, -5, 0], [3, 3, 0], [-3, 3, 0]]
+    roof = [[-1.3, 0, 0.1], [-0.3, -0.5, 0.2], [-0.5, 0.6, 1.2]]
+    normals = [[-0.1, -0.6, 0.5], [0.2, -0.6, 0.5], [0, -0.8, 0.5]]
+    return [
+        drpt.Mesh(floor, [[0, 1, 2], [0, 2, 3]], material=drpt.Diffuse((0.7, 0.6, 0.5))),
+        drpt.Mesh(roof, [[0, 1, 2]], normals, material=drpt.Diffuse(0.8)),
+        drpt.Sphere((0.7, 0, 0.5), 0.5, material=drpt.Phong((0.8, 0.7, 0.9), 30)),
+    ]
+
+
+def lights(split: int = 0) -> list[Shape]:
+    """A lamp and a panel that faces down, cut into 2 · 4^split triangles."""
+    corners = np.array([[0, 0, 2], [0, 1, 2], [1.2, 1, 2], [1.2, 0, 2.0]])
+    triangles = corners[[[0, 1, 2], [0, 2, 3]]]
+    for _ in range(split):
+        triangles = quartered(triangles)
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    return [
+        drpt.Sphere((-0.8, -1, 1.2), 0.25, radiance=(4, 6, 8)),
+        drpt.Mesh(triangles.reshape(-1, 3), faces, radiance=(9, 7, 5)),
+    ]
+
+
+def quartered(triangles: Floats) -> Floats:
+    a, b, c = triangles.swapaxes(0, 1)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    parts = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
+@pytest.fixture(scope="module")
+def reference() -> Measured:
+    """Reflected light of the small scene; detects 0.7 %, as do those compared with it."""
+    return measure_to(UNCHANGED * 0.7, small_scene(), 2, "mis", reflected=True)
+
+
+def assert_unchanged(scene: drpt.Scene, reference: Measured, mode: str = "mis") -> None:
+    found = measure_to(UNCHANGED * 0.7, scene, 2, mode, reflected=True, seed=5)
+    assert_agree(found, reference, UNCHANGED * 1.1)
+
+
+@pytest.mark.parametrize(
+    "split", [pytest.param(1, marks=pytest.mark.slow), 3]
+)  # 8 triangles, and more than the kernel unrolls
+def test_splitting_a_light_changes_nothing(split: int, reference: Measured) -> None:
+    assert_unchanged(small_scene([*reflecting(), *lights(split)]), reference)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["implicit", "explicit"])
+def test_other_modes_give_the_same_of_the_small_scene(mode: str, reference: Measured) -> None:
+    assert_unchanged(small_scene(), reference, mode)
+
+
+def test_splitting_triangles_changes_nothing(reference: Measured) -> None:
+    floor, *others = reflecting()
+    assert isinstance(floor, drpt.Mesh)
+    pieces = quartered(quartered(floor.vertices[floor.faces])).reshape(-1, 3)
+    faces = np.arange(len(pieces)).reshape(-1, 3)
+    split = drpt.Mesh(pieces, faces, material=floor.material)
+    assert_unchanged(small_scene([split, *others, *lights()]), reference)
+
+
+def test_black_and_unlit_shapes_out_of_sight_change_nothing(reference: Measured) -> None:
+    below: list[Shape] = [
+        drpt.Sphere((0, 0, -2), 0.5, radiance=0),
+        drpt.Sphere((1, 0, -2), 0.3, radiance=5),  # chosen, and always blocked
+        drpt.Mesh([[0, 1, -1], [1, 0, -1], [0, 0, -1]], [[0, 1, 2]], material=drpt.Phong(1, 9)),
+    ]
+    assert_unchanged(small_scene([*reflecting(), *lights(), *below]), reference)
+
+
+def transformed(turn: Floats, scale: float = 1.0, shift: Floats | None = None) -> drpt.Scene:
+    """The small scene, its camera too, turned, scaled and shifted."""
+    scene = small_scene()
+    camera = scene.camera
+    shift = np.zeros(3) if shift is None else shift
+
+    def place(points: object) -> Floats:
+        return np.asarray(scale * (np.asarray(points) @ turn.T) + shift)
+
+    shapes: list[Shape] = []
+    for shape in scene.shapes:
+        if isinstance(shape, drpt.Sphere):
+            radius = scale * shape.radius
+            shapes.append(drpt.Sphere(place(shape.center), radius, shape.material, shape.radiance))
+        else:
+            normals = None if shape.normals is None else shape.normals @ turn.T
+            vertices = place(shape.vertices)
+            shapes.append(drpt.Mesh(vertices, shape.faces, normals, shape.material, shape.radiance))
+    eye, target, up = place(camera.eye), place(camera.target), turn @ camera.up
+    moved = drpt.Camera(eye, target, up, camera.fov, camera.width, camera.height)
+    return drpt.Scene(camera=moved, shapes=shapes)
+
+
+TURN = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+TURN *= np.linalg.det(TURN)  # a rotation, no mirror image
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pytest.param(transformed(TURN), id="turned", marks=pytest.mark.slow),
+        pytest.param(transformed(np.eye(3), shift=np.array([1e5, -3e4, 777])), id="shifted"),
+        pytest.param(transformed(TURN, 3.3e-4, np.array([1.0, 2, 3])), id="tiny and shifted"),
+    ],
+)
+def test_place_and_orientation_do_not_matter(scene: drpt.Scene, reference: Measured) -> None:
+    assert_unchanged(scene, reference)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_powers_of_two_change_no_bit(mode: str) -> None:
+    picture = drpt.render(small_scene(), 16, 3, mode).image
+    for power in (-10, 10):
+        scaled = transformed(np.eye(3), 2.0**power)
+        assert np.array_equal(drpt.render(scaled, 16, 3, mode).image, picture)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_twice_the_radiance_is_twice_the_picture_to_the_bit(mode: str) -> None:
+    picture = drpt.render(small_scene(), 16, 3, mode).image
+    brighter = drpt.render(with_radiance(small_scene(), 2), 16, 3, mode).image
+    assert picture.any()
+    assert np.array_equal(brighter, 2 * picture)
+
+
+@pytest.mark.parametrize("radiance", [1e-30, 1e29])
+def test_extreme_radiances_lose_nothing(radiance: float) -> None:
+    power = 2.0 ** round(log2(radiance))
+    scene = with_radiance(small_scene(), power)
+    found = drpt.render(scene, 16, 2, "explicit")
+    plain = drpt.render(small_scene(), 16, 2, "explicit").image
+    assert found.non_finite == 0
+    # What would be subnormal counts as 0: a ten-millionth of the picture at the lowest radiance.
+    assert found.image / power == pytest.approx(plain, rel=1e-5, abs=1e-7 * float(plain.mean()))
+
+
+def test_samplers_agree(reference: Measured) -> None:
+    sobol = measure(small_scene(), 2**21, 2, "mis", reflected=True, sampler="sobol")
+    assert_agree(sobol, reference, UNCHANGED)
+
+
+def test_pass_plans_agree(monkeypatch: pytest.MonkeyPatch, reference: Measured) -> None:
+    module = sys.modules["drpt.render"]
+    monkeypatch.setattr(module, "LAUNCH_PATHS", 2**17)
+    monkeypatch.setattr(module, "LAUNCH_PIXELS", 1000)
+    monkeypatch.setattr(module, "LAUNCH_LANES", 2**13)
+    assert_agree(measure(small_scene(), 2**21, 2, "mis", reflected=True), reference, 4 * UNCHANGED)
+
+
+def test_jitter_moves_samples_off_the_pixels_centres() -> None:
+    scene = small_scene()
+    soft = drpt.render(scene, 64, 0)
+    hard = drpt.render(scene, 1, 0, jitter=False)
+    colours = {tuple(c) for c in hard.image.reshape(-1, 3).tolist()}
+    assert len(colours) <= 3  # black and the two lights
+    assert len({tuple(c) for c in soft.image.reshape(-1, 3).tolist()}) > 10
+    many = drpt.render(scene, 7, 0, jitter=False, seed=3)
+    assert np.array_equal(many.image, hard.image)

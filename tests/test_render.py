@@ -1,0 +1,353 @@
+"""render(), Rendering and explain(): settings, results, reproducibility, memory."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import subprocess
+import sys
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import drpt
+from drpt.output import read_exr
+from drpt.render import plan_passes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# A render of 4096 x 4096 pixels is to run within this; its image alone takes 0.6 GiB, as float64.
+MAX_BYTES = 2 * 2**30
+MODULE = sys.modules["drpt.render"]
+
+LIGHT = drpt.Sphere((0, 2, 1), 0.5, radiance=(3, 2, 1))
+BALL = drpt.Sphere((0, 0, 0), 1, material=drpt.Diffuse((0.9, 0.5, 0.2)))
+
+
+def scene_of(*shapes: drpt.Sphere | drpt.Mesh, width: int = 12, height: int = 8) -> drpt.Scene:
+    camera = drpt.Camera((0, 1, 5), (0, 0.6, 0), (0, 1, 0), 50, width, height)
+    return drpt.Scene(camera=camera, shapes=shapes)
+
+
+SCENE = scene_of(BALL, LIGHT)
+
+
+def test_result_says_what_was_rendered_and_how() -> None:
+    result = drpt.render(SCENE, 5, 2, "explicit", sampler="independent", seed=9, jitter=False)
+    assert result.image.shape == (8, 12, 3)
+    assert result.image.dtype == np.float32
+    assert result.image.max() > 0
+    assert result.scene is SCENE
+    assert (result.spp, result.bounces, result.mode) == (5, 2, drpt.Mode.EXPLICIT)
+    assert (result.sampler, result.seed, result.jitter) == ("independent", 9, False)
+    assert result.non_finite == 0
+    assert result.seconds > 0
+    assert result.paths == 8 * 12 * 5
+    assert result.rays >= result.paths
+
+
+def test_defaults() -> None:
+    parameters = inspect.signature(drpt.render).parameters
+    defaults = {name: p.default for name, p in parameters.items() if p.default is not p.empty}
+    assert defaults == {
+        "spp": 64,
+        "bounces": 3,
+        "mode": "mis",
+        "sampler": "sobol",
+        "seed": 0,
+        "jitter": True,
+    }
+
+
+def test_a_result_is_an_array() -> None:
+    result = drpt.render(SCENE, 1)
+    assert np.array_equal(np.asarray(result), result.image)
+    assert np.asarray(result).dtype == np.float32
+    assert np.asarray(result, np.float64).dtype == np.float64
+    copy = np.array(result)
+    copy[:] = -1
+    assert result.image.min() >= 0
+
+
+def test_metadata_comes_back_from_a_saved_picture(tmp_path: Path) -> None:
+    result = drpt.render(SCENE, 3, 1, "implicit", seed=4)
+    result.save(tmp_path / "picture.exr")
+    image, metadata = read_exr(tmp_path / "picture.exr")
+    assert np.array_equal(image, result.image)
+    assert metadata == result.metadata
+    assert metadata["mode"] == "implicit"
+    assert (metadata["spp"], metadata["bounces"], metadata["seed"]) == (3, 1, 4)
+    assert metadata["rays"] == result.rays
+    assert metadata["drpt"] == drpt.__version__
+    file = tmp_path / "scene.toml"
+    file.write_text(str(metadata["scene"]))
+    assert drpt.load_scene(file) == SCENE
+
+
+@pytest.mark.parametrize("suffix", [".png", ".npy"])
+def test_save_follows_the_suffix(suffix: str, tmp_path: Path) -> None:
+    drpt.render(SCENE, 1).save(tmp_path / f"picture{suffix}")
+    assert (tmp_path / f"picture{suffix}").stat().st_size > 100
+
+
+def test_save_refuses_an_unknown_suffix(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"\.exr"):
+        drpt.render(SCENE, 1).save(tmp_path / "picture.gif")
+
+
+@pytest.mark.parametrize("mode", drpt.Mode)
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+def test_same_call_same_bits(mode: str, sampler: str) -> None:
+    a, b = (drpt.render(SCENE, 9, 2, mode, sampler=sampler, seed=3) for _ in range(2))
+    assert np.array_equal(a.image, b.image)
+    assert a.rays == b.rays
+
+
+def test_other_seeds_give_other_noise() -> None:
+    images = [drpt.render(SCENE, 4, seed=seed).image for seed in (0, 1, 2**32, 2**70)]
+    for index, image in enumerate(images[1:]):
+        assert all(not np.array_equal(image, other) for other in images[: index + 1])
+
+
+def test_threads_change_no_bit() -> None:
+    code = (
+        "import sys, drpt\n"
+        "from drpt.kernel import backend\n"
+        "backend.load()\n"
+        "backend.set_thread_count(int(sys.argv[1]))\n"
+        "scene = drpt.load_scene('cornell-box-glossy')\n"
+        "result = drpt.render(scene, 2, 3, 'mis')\n"
+        "print(hash(result.image.tobytes()), result.rays)"
+    )
+    answers = {
+        subprocess.run(
+            [sys.executable, "-c", code, threads],
+            env={**os.environ, "PYTHONHASHSEED": "0"},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for threads in ("1", "2", "3")
+    }
+    assert len(answers) == 1
+
+
+def test_no_bounces_show_lights_alone() -> None:
+    image = drpt.render(SCENE, 16, 0, jitter=False).image
+    seen = image.any(axis=2)
+    assert 0 < seen.mean() < 0.5
+    assert np.unique(image[seen], axis=0).tolist() == [[3, 2, 1]]
+
+
+@pytest.mark.parametrize("mode", drpt.Mode)
+def test_a_scene_without_light_is_black(mode: str) -> None:
+    dark = scene_of(BALL, drpt.Sphere((0, 2, 1), 0.5, radiance=0))
+    assert not drpt.render(dark, 4, 3, mode).image.any()
+
+
+@pytest.mark.parametrize("mode", drpt.Mode)
+def test_a_scene_of_lights_alone_shows_them(mode: str) -> None:
+    lights = scene_of(LIGHT, drpt.Sphere((0, 0, 0), 1, radiance=7))
+    direct = drpt.render(lights, 4, 0, mode).image
+    assert direct.max() == 7
+    assert np.array_equal(drpt.render(lights, 4, 3, mode).image, direct)
+
+
+@pytest.mark.parametrize("mode", drpt.Mode)
+def test_camera_inside_a_light_sees_nothing_of_it(mode: str) -> None:
+    inside = scene_of(drpt.Sphere((0, 1, 5), 1, radiance=3), BALL)
+    assert not drpt.render(inside, 4, 2, mode).image.any()
+
+
+def test_a_picture_of_one_pixel() -> None:
+    picture = drpt.render(scene_of(BALL, LIGHT, width=1, height=1), 1000, 1, "explicit")
+    assert picture.image.shape == (1, 1, 3)
+    assert picture.image.min() > 0
+
+
+BAD_SETTINGS: list[tuple[dict[str, Any], str]] = [
+    ({"scene": "cornell-box"}, "scene"),
+    ({"spp": 0}, "spp"),
+    ({"spp": 2.0}, "spp"),
+    ({"spp": True}, "spp"),
+    ({"spp": 2**60}, "spp"),
+    ({"bounces": -1}, "bounces"),
+    ({"bounces": "3"}, "bounces"),
+    ({"mode": "bidirectional"}, "mode"),
+    ({"mode": None}, "mode"),
+    ({"sampler": "halton"}, "sampler"),
+    ({"sampler": ["sobol"]}, "sampler"),
+    ({"seed": -1}, "seed"),
+    ({"seed": 0.5}, "seed"),
+]
+
+
+@pytest.mark.parametrize(("settings", "field"), BAD_SETTINGS)
+def test_bad_settings_are_refused_by_name(settings: dict[str, Any], field: str) -> None:
+    with pytest.raises(ValueError, match=rf"^{field}: .* is not allowed; it must be") as error:
+        drpt.render(**{"scene": SCENE, **settings})
+    assert repr(settings[field]) in str(error.value)
+
+
+def test_the_error_of_an_unknown_mode_lists_all() -> None:
+    with pytest.raises(ValueError, match=r"implicit-uniform, implicit, explicit-uniform, .*, mis"):
+        drpt.render(SCENE, mode="path")
+
+
+def test_settings_are_checked_before_drjit_is_loaded() -> None:
+    code = (
+        "import sys, drpt\n"
+        "scene = drpt.load_scene('furnace')\n"
+        "try:\n"
+        "    drpt.render(scene, spp=0)\n"
+        "except ValueError:\n"
+        "    print('drjit' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_numpy_numbers_are_numbers() -> None:
+    result = drpt.render(SCENE, np.int64(2), np.int32(1), seed=np.uint8(3))  # type: ignore[arg-type]
+    assert (result.spp, result.bounces, result.seed) == (2, 1, 3)
+    assert type(result.spp) is int
+
+
+@pytest.mark.parametrize("pixels", [1, 96, 65536, 2**20, 2**24, 65536**2])
+@pytest.mark.parametrize("spp", [1, 63, 64, 4096, 10**6 + 1])
+def test_plans_cover_every_sample_once(pixels: int, spp: int) -> None:
+    end = 0
+    for samples in islice(plan_passes(pixels, spp), 5000):
+        assert samples.start == end
+        end = samples.stop
+    assert end == spp or end >= 5000
+
+
+@pytest.mark.parametrize("pixels", [1, 7, 65536, 2**20, 2**24])
+def test_passes_are_bounded_and_do_not_cross_multiples_of_2_to_32(pixels: int) -> None:
+    spp = 2**33 + 5
+    sizes = {len(samples) for samples in islice(plan_passes(pixels, spp), 64)}
+    (size,) = sizes
+    assert size.bit_count() == 1
+    assert size <= 2**32
+    assert size * min(pixels, 2**20) <= 2**26  # paths of a launch
+
+
+def test_plans_depend_on_resolution_and_spp_alone() -> None:
+    assert list(plan_passes(4096**2, 4096)) == list(plan_passes(4096**2, 4096))
+    assert list(plan_passes(96, 10)) == [range(10)]
+
+
+def test_passes_report_progress_and_can_be_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MODULE, "LAUNCH_PATHS", 96 * 4)
+    rendering = drpt.Rendering(SCENE, 10, 1)
+    assert list(rendering.passes()) == [4, 8, 10]
+    assert rendering.result().spp == 10
+    stopped = drpt.Rendering(SCENE, 10, 1)
+    next(stopped.passes())
+    monkeypatch.undo()
+    assert np.array_equal(stopped.result().image, drpt.render(SCENE, 4, 1).image)
+    assert stopped.result().paths == 96 * 4
+
+
+def test_parts_of_a_pass_make_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = drpt.render(SCENE, 4, 2)
+    monkeypatch.setattr(MODULE, "LAUNCH_PIXELS", 17)
+    parts = drpt.render(SCENE, 4, 2)
+    assert parts.image == pytest.approx(whole.image, rel=1e-6)
+    assert parts.rays == whole.rays
+
+
+def test_injected_infinities_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    from drpt.kernel.path import Tracer
+
+    trace = Tracer.trace
+
+    def broken(self: Tracer, ray: Any, sampler: Any) -> Any:
+        import drjit as dr
+
+        radiance, rays = trace(self, ray, sampler)
+        bad = dr.select(sampler.pixel == 5, float("nan"), 0)
+        bad = dr.select(sampler.pixel == 7, float("inf"), bad)
+        return radiance + bad, rays
+
+    monkeypatch.setattr(Tracer, "trace", broken)
+    result = drpt.render(SCENE, 6, 1)
+    assert result.non_finite == 12
+    pixels = result.image.reshape(-1, 3)
+    assert np.isnan(pixels[5]).all()
+    assert np.isposinf(pixels[7]).all()
+    assert np.isfinite(np.delete(pixels, [5, 7], axis=0)).all()
+
+
+EXPECTED_FEATURES = {
+    "spheres",
+    "triangles",
+    "interpolated_normals",
+    "diffuse",
+    "phong",
+    "emission",
+    "direct_light",
+    "light_choice",
+    "mis",
+}
+
+
+def test_explain_names_features_and_counts_operations() -> None:
+    told = drpt.explain(SCENE, bounces=2, mode="explicit")
+    assert set(told.features) >= EXPECTED_FEATURES
+    on = {name for name in EXPECTED_FEATURES if told.features[name]}
+    assert on == {"spheres", "diffuse", "emission", "direct_light"}
+    assert told.operations > 100
+    lines = dict(line.split() for line in str(told).splitlines())
+    assert lines["phong"] == "no"
+    assert lines["diffuse"] == "yes"
+    assert lines["operations"] == str(told.operations)
+
+
+def test_kernels_shrink_with_what_a_scene_lacks() -> None:
+    wall = drpt.Mesh([[-1, -1, -2], [1, -1, -2], [0, 1, -2]], [[0, 1, 2]], material=BALL.material)
+    smooth = drpt.Mesh(
+        wall.vertices, wall.faces, [[0.0, 0, 1], [0.1, 0, 1], [0, 0.1, 1]], BALL.material
+    )
+    shiny = drpt.Sphere((2, 0, 0), 0.5, material=drpt.Phong(0.5, 20))
+    lamp = drpt.Sphere((-2, 2, 0), 0.1, radiance=5)
+
+    def operations(*shapes: Any, bounces: int = 2, mode: str = "explicit") -> int:
+        return drpt.explain(scene_of(*shapes), bounces, mode).operations
+
+    plain = operations(BALL, LIGHT)
+    assert operations(BALL, LIGHT, wall) > plain
+    assert operations(BALL, LIGHT, smooth) > operations(BALL, LIGHT, wall)
+    assert operations(BALL, LIGHT, shiny) > plain
+    assert operations(BALL, LIGHT, lamp) > plain
+    assert operations(BALL, LIGHT, mode="mis") > plain > operations(BALL, LIGHT, mode="implicit")
+    assert operations(BALL, LIGHT, bounces=0) < operations(BALL, LIGHT, bounces=1) < plain
+    assert operations(BALL) < operations(BALL, LIGHT, bounces=0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"), [({"mode": "x"}, "mode"), ({"bounces": -1}, "bounces")]
+)
+def test_explain_refuses_bad_settings(settings: dict[str, Any], field: str) -> None:
+    with pytest.raises(ValueError, match=rf"^{field}: "):
+        drpt.explain(SCENE, **settings)
+
+
+@pytest.mark.slow
+def test_a_large_picture_fits_into_memory() -> None:
+    code = (
+        "import resource, drpt\n"
+        "scene = drpt.load_scene('cornell-box')\n"
+        "c = scene.camera\n"
+        "camera = drpt.Camera(c.eye, c.target, c.up, c.fov, 4096, 4096)\n"
+        "result = drpt.render(drpt.Scene(camera=camera, shapes=scene.shapes), 1, 2)\n"
+        "print(result.image.mean(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    mean, kibibytes = map(float, done.stdout.split())
+    assert mean > 0.8
+    assert kibibytes * 1024 < MAX_BYTES
