@@ -10,6 +10,7 @@ import drjit as dr
 import numpy as np
 
 from drpt.kernel.camera import DeviceCamera, make_camera
+from drpt.kernel.denormals import flush_denormals
 from drpt.kernel.device_scene import upload
 from drpt.kernel.estimator import Features
 from drpt.kernel.path import Tracer
@@ -67,9 +68,12 @@ class Launcher:
         )
         lane = dr.arange(index, len(pixels) * replicates)
         radiance, rays, non_finite = self._trace(lane, *(dr.opaque(index, i) for i in inputs))
-        dr.eval(radiance, rays, non_finite)
-        by_lane = np.array(radiance).reshape(3, replicates, len(pixels))
-        return Sums(by_lane.sum(axis=1).T, _total(rays), _total(non_finite))
+        with flush_denormals():
+            dr.eval(radiance, rays, non_finite)
+            dr.sync_thread()
+        by_lane = (np.array(channel).reshape(replicates, -1) for channel in radiance)
+        by_pixel = np.column_stack([channel.sum(axis=0) for channel in by_lane])
+        return Sums(by_pixel, _total(rays), _total(non_finite))
 
     def _trace(
         self,

@@ -37,7 +37,8 @@ class TriangleMesh:
             buffers["vertex_positions"] = types.Float32(triangles.ravel())
             buffers["faces"] = dr.arange(types.UInt32, 3 * count)
             buffers.update()
-            self._scene = mi.load_dict({"type": "scene", "mesh": mesh})
+            scene = {"type": "scene", "mesh": mesh, "embree_use_robust_intersections": True}
+            self._scene = mi.load_dict(scene)
             self._ray = mi.Ray3f
 
     def closest(self, ray: Ray, active: Bool) -> tuple[UInt32, Bool, Float]:

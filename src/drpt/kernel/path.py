@@ -136,11 +136,11 @@ class Tracer:
         if scene.light_count > 1:
             light = dr.select(lit, hit.primitive - scene.first_light, 0)
         row = scene.radiance_row(light)
-        radiance = dr.select(lit, vec3(row[0], row[1], row[2]), 0)
-        if pdf is None:
-            return radiance
-        density = 1 / inverse_pdf(scene, self.features, ray, light, hit)
-        return radiance * power_heuristic(density / pdf)
+        radiance = vec3(row[0], row[1], row[2])
+        if pdf is not None:
+            density = 1 / inverse_pdf(scene, self.features, ray, light, hit)
+            radiance = radiance * power_heuristic(density / pdf)
+        return dr.select(lit, radiance, 0)
 
     def _direct(
         self, hit: Hit, brdf: Brdf, sampler: Sampler, depth: int | UInt32

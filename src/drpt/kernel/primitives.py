@@ -130,7 +130,7 @@ def make_primitives(scene: Scene) -> Primitives:
     flat = [_part(m, origin) for m in meshes if not m.is_light and m.normals is None]
     smooth = [_part(m, origin) for m in meshes if not m.is_light and m.normals is not None]
     lit = [_part(m, origin) for m in meshes if m.is_light]
-    flat, facets = _unrolled(flat, [*smooth, *lit])
+    flat, facets = _unrolled(flat, [*smooth, *lit], np.subtract(scene.camera.eye, origin))
     parts = [*flat, *smooth, *lit]
     dull_spheres = [_Part(s, _row(s, origin)) for s in spheres if not s.is_light]
     lit_spheres = [_Part(s, _row(s, origin)) for s in spheres if s.is_light]
@@ -169,7 +169,9 @@ def _part(mesh: Mesh, origin: Array) -> _Part:
     return _Part(mesh, corners[kept], mesh.normals[mesh.faces[kept]])
 
 
-def _unrolled(flat: list[_Part], others: list[_Part]) -> tuple[list[_Part], tuple[Facet, ...]]:
+def _unrolled(
+    flat: list[_Part], others: list[_Part], eye: Array
+) -> tuple[list[_Part], tuple[Facet, ...]]:
     """Facets, and the flat parts with coplanar triangles merged; no facets if they are many."""
     if sum(len(part.primitives) for part in (*flat, *others)) > MERGE_LIMIT:
         return flat, ()
@@ -177,7 +179,8 @@ def _unrolled(flat: list[_Part], others: list[_Part]) -> tuple[list[_Part], tupl
     polygons = [polygon for part in (*merged, *others) for polygon in part.primitives]
     if len(polygons) > UNROLL_LIMIT:
         return flat, ()
-    return merged, tuple(map(make_facet, polygons))
+    reach = float(np.abs(np.concatenate([*polygons, [eye]])).max())
+    return merged, tuple(make_facet(polygon, reach) for polygon in polygons)
 
 
 def _row(sphere: Sphere, origin: Array) -> Array:
