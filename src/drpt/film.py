@@ -34,9 +34,10 @@ class Film:
         """Add a pass of ``count`` samples per pixel, or its part: the sums (len(pixels), 3)."""
         part = slice(pixels.start, pixels.stop)
         share = count / (self._samples + count)
-        deviation = sums / count - self.mean[part]
-        self.mean[part] += share * deviation
-        self._spread[part] += self._samples * share * deviation**2
+        with np.errstate(invalid="ignore"):  # an infinite sample leaves a spread that is NaN
+            deviation = sums / count - self.mean[part]
+            self.mean[part] += share * deviation
+            self._spread[part] += self._samples * share * deviation**2
         if pixels.stop == len(self.mean):
             self.passes += 1
             self._samples += count

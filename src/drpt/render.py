@@ -140,28 +140,30 @@ class Rendering:
         self.mode = _check_mode(mode)
         self.sampler = _check_choice("sampler", sampler, SAMPLERS)
         self.seed = _check_whole("seed", seed, 0, None)
-        self.jitter = bool(jitter)
+        self.jitter = _check_switch("jitter", jitter)
         self._film = Film(scene.camera.width * scene.camera.height)
         self._done = 0
         self._rays = 0
         self._non_finite = 0
         self._seconds = 0.0
 
-    def passes(self) -> Iterator[float]:
-        """Run; yields, a few times a second, the samples per pixel that are done."""
-        start = perf_counter()
+    def passes(self) -> Iterator[int]:
+        """Run the passes that have not run yet; yields after each the samples per pixel so far."""
+        start = perf_counter() - self._seconds
         launcher = self.launcher()
         pixels = len(self._film.mean)
         for samples in plan_passes(pixels, self.spp):
+            if samples.start < self._done:
+                continue
             for part in _parts(pixels):
                 replicates = min(len(samples), max(1, LAUNCH_LANES // len(part)))
                 sums = launcher.launch(part, samples, replicates, self.seed)
                 self._film.add(part, sums.radiance, len(samples))
                 self._rays += sums.rays
                 self._non_finite += sums.non_finite
-                self._seconds = perf_counter() - start
-                yield samples.start + len(samples) * part.stop / pixels
             self._done = samples.stop
+            self._seconds = perf_counter() - start
+            yield self._done
 
     def launcher(self) -> Launcher:
         """Put the scene on the device."""
@@ -300,6 +302,12 @@ def _check_choice(name: str, value: object, choices: tuple[str, ...]) -> str:
     if not isinstance(value, str) or value not in choices:
         raise _refuse(name, value, f"one of {', '.join(choices)}")
     return value
+
+
+def _check_switch(name: str, value: object) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise _refuse(name, value, "True or False")
+    return bool(value)
 
 
 def _refuse(name: str, value: object, allowed: str) -> ValueError:

@@ -71,7 +71,7 @@ def test_a_planar_quad_is_one_polygon() -> None:
     (polygon,) = merge_coplanar(SQUARE[QUAD])
     assert len(polygon) == 4
     assert area(polygon) == 1
-    assert facet_of(polygon).normal == (0, 0, 1)
+    assert make_facet(polygon).normal == (0, 0, 1)
 
 
 def test_corners_along_straight_edges_vanish() -> None:
@@ -121,11 +121,6 @@ def test_merged_polygons_cover_what_the_triangles_cover(seed: int) -> None:
     assert all(map(is_convex, polygons))
 
 
-def facet_of(corners: Floats) -> Facet:
-    """Facet that rays reach from no farther than its own corners."""
-    return make_facet(corners, float(np.abs(corners).max()))
-
-
 def is_convex(polygon: Floats) -> bool:
     """Whether every corner is one of the convex hull, too."""
     spokes = polygon - polygon[0]
@@ -148,7 +143,7 @@ def test_slabs_hold_the_polygon_and_nothing_else(seed: int) -> None:
     points = centre + rng.uniform(0, 2, (4000, 1)) * (weights @ corners - centre)
 
     depth = depth_inside(corners, points)
-    inside = within_slabs(facet_of(corners), points)
+    inside = within_slabs(make_facet(corners), points)
 
     room = EDGE * np.abs(corners).max()
     sure = np.abs(depth) > room
@@ -161,19 +156,19 @@ def test_slabs_let_no_seam_open_between_neighbours() -> None:
     a, b, c, d = random_plane(rng, np.array([[0.0, 0], [3, 0.1], [2, 2], [-1, 1]]))
     shared = a + rng.uniform(0, 1, (4000, 1)) * (c - a)
     rounded = shared.astype(np.float32).astype(np.float64)
-    left, right = facet_of(np.array([a, b, c])), facet_of(np.array([a, c, d]))
+    left, right = make_facet(np.array([a, b, c])), make_facet(np.array([a, c, d]))
     assert (within_slabs(left, rounded) | within_slabs(right, rounded)).all()
 
 
 def test_parallel_edges_share_a_slab() -> None:
-    assert len(facet_of(SQUARE).slabs) == 2
+    assert len(make_facet(SQUARE).slabs) == 2
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_plane_of_a_facet_holds_its_corners(seed: int) -> None:
     rng = np.random.default_rng(seed)
     corners = random_polygon(rng, 5)
-    facet = facet_of(corners)
+    facet = make_facet(corners)
     assert np.linalg.norm(facet.normal) == pytest.approx(1, rel=ROUNDING)
     assert np.abs(corners @ facet.normal - facet.offset).max() < 1e-8  # small components are 0
     spoke = np.cross(corners[1] - corners[0], corners[2] - corners[0])
@@ -192,7 +187,7 @@ def test_triangles_without_area_are_told() -> None:
 
 
 def test_a_facet_bounds_what_is_on_one_side_of_its_plane() -> None:
-    facet = facet_of(SQUARE)
+    facet = make_facet(SQUARE)
     above = np.array([[0.5, 0.5, 1.0], [5, 5, 2]])
     assert bounds(facet, above, np.zeros(2))
     assert bounds(facet, -above, np.zeros(2))
@@ -206,7 +201,7 @@ def test_a_facet_bounds_what_is_on_one_side_of_its_plane() -> None:
 def test_no_two_points_are_separated_by_a_facet_that_bounds_them(seed: int) -> None:
     rng = np.random.default_rng(seed)
     corners = random_polygon(rng, 4)
-    facet = facet_of(corners)
+    facet = make_facet(corners)
     points = rng.uniform(-3, 3, (400, 3))
     points = points[(points @ facet.normal - facet.offset) * rng.choice([-1, 1]) >= 0]
     assert bounds(facet, points, np.zeros(len(points)))

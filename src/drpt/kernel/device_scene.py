@@ -37,8 +37,9 @@ class DeviceScene:
     ----------
     facets, blockers
         Constants of each facet, and whether it can cast a shadow.
-    mesh
-        The triangles, where they are too many for facets.
+    mesh, reach
+        The triangles that are too many for facets, and the largest coordinate of each one that
+        reflects.
     balls
         Each sphere, where they are few.
     geometry
@@ -56,6 +57,7 @@ class DeviceScene:
     """
 
     types: ModuleType
+    first_facet: int
     first_smooth: int
     first_sphere: int
     first_light: int
@@ -63,6 +65,7 @@ class DeviceScene:
     facets: tuple[Facet, ...]
     blockers: tuple[bool, ...]
     mesh: TriangleMesh | None
+    reach: Float | None
     balls: tuple[Ball, ...]
     geometry: Float
     reflectance: Float
@@ -97,6 +100,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
     return DeviceScene(
         types=types,
+        first_facet=len(triangles),
         first_smooth=primitives.first_smooth,
         first_sphere=first,
         first_light=primitives.first_light,
@@ -104,6 +108,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         facets=primitives.facets,
         blockers=tuple(primitives.blockers()),
         mesh=TriangleMesh(triangles, types) if len(triangles) else None,
+        reach=array(np.abs(triangles[:first]).max(axis=(1, 2))) if len(triangles) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
         geometry=array(np.concatenate([planes, primitives.spheres, lit_planes])),
         reflectance=array(primitives.reflectance),

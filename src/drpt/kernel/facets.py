@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 COPLANAR = 1e-9
 """How far from a plane, relative to a polygon's extent, is on it: 1/60 of a float32 ulp."""
-EDGE_WIDENING = 2.0**-23
-"""Room for the rounding of hit points, relative to the scene: closes the seams of meshes."""
+EDGE_WIDENING = 2.0**-22
+"""Room for the rounding of a hit point, relative to its coordinates: closes the seams of meshes."""
 
 
 class Slab(NamedTuple):
@@ -43,23 +43,20 @@ class Facet(NamedTuple):
     slabs: tuple[Slab, ...]
 
 
-def make_facet(corners: Array, reach: float) -> Facet:
-    """Facet of a convex planar polygon with an area; the corners turn counter-clockwise.
-
-    ``reach`` is the largest coordinate from which a ray may come.
-    """
+def make_facet(corners: Array) -> Facet:
+    """Facet of a convex planar polygon with an area; the corners turn counter-clockwise."""
     area_normal = _area_normal(corners)
     normal = area_normal / np.linalg.norm(area_normal)
     normal[np.abs(normal) < COPLANAR] = 0
     normal /= np.linalg.norm(normal)
     offset = float((corners @ normal).mean())
-    return Facet(corners, tuple(normal.tolist()), offset, _slabs(corners, normal, reach))
+    return Facet(corners, tuple(normal.tolist()), offset, _slabs(corners, normal))
 
 
 def has_area(triangles: Array) -> NDArray[np.bool_]:
-    """Which of the triangles (m, 3, 3) a ray can hit."""
+    """Which of the triangles (m, 3, 3) a ray can hit: those whose normal has a length."""
     a, b, c = triangles.swapaxes(0, 1)
-    return np.asarray(np.cross(b - a, c - a).any(axis=1))
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0)
 
 
 def bounds(facet: Facet, points: Array, radii: Array) -> bool:
@@ -118,6 +115,8 @@ def _turns(corners: Array) -> Array:
 
 def _is_planar_and_convex(corners: Array) -> bool:
     normal = _area_normal(corners)
+    if not normal.any():  # two polygons back to back
+        return False
     normal = normal / np.linalg.norm(normal)
     extent = np.ptp(corners, axis=0).max()
     heights = (corners - corners[0]) @ normal
@@ -138,12 +137,12 @@ def _area_normal(corners: Array) -> Array:
     return np.asarray(np.cross(spokes[:-1], spokes[1:]).sum(axis=0) / 2)
 
 
-def _slabs(corners: Array, normal: Array, reach: float) -> tuple[Slab, ...]:
+def _slabs(corners: Array, normal: Array) -> tuple[Slab, ...]:
     """Half-planes of the edges, projected along the normal's main axis; opposite ones joined."""
     limits: dict[tuple[float, ...], list[float]] = {}
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         inward, main = _inward(end - start, normal)
-        level, room = inward @ start, EDGE_WIDENING * reach * np.abs(inward).sum()
+        level, room = inward @ start, EDGE_WIDENING * np.abs(inward) @ np.abs(corners).max(axis=0)
         low_high = limits.setdefault(tuple(inward.tolist()), [-np.inf, np.inf])
         side, value = (0, level - room) if main > 0 else (1, level + room)
         low_high[side] = float(value)

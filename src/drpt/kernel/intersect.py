@@ -25,6 +25,12 @@ SPAWN_OFFSET = 2.0**-20
 
 A hit point that was projected back onto its surface, and the test against the same surface, are
 together off by about ten half ulps at the most (Wächter & Binder 2019, Ray Tracing Gems, ch. 6).
+For a triangle of a mesh, whose test starts from its corners, those are coordinates, too.
+"""
+COINCIDENT = 1 - 2.0**-20
+"""Ratio of two distances, rounded alike, that may be the same.
+
+A light lies on top of a surface that it coincides with, and no surface there shades it.
 """
 
 
@@ -49,7 +55,8 @@ def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) 
     """The first surface that a ray meets."""
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
     for number, met, t in _candidates(scene, ray, active):
-        closer = met & (t < nearest)
+        is_light = isinstance(number, int) and number >= scene.first_light
+        closer = met & (COINCIDENT * t < nearest if is_light else t < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
     return _surface(scene, features, ray, nearest, primitive, active & (nearest < dr.inf))
@@ -59,7 +66,7 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
     """Whether anything but the light itself stands on the first ``distance`` of a ray."""
     blocked = scene.types.Bool(False)
     for _, met, t in _candidates(scene, ray, active, skip=scene.first_light + light):
-        blocked |= met & (t < distance)
+        blocked |= met & (t < COINCIDENT * distance)
     return blocked
 
 
@@ -72,7 +79,9 @@ def _candidates(
     """
     if scene.mesh is not None:
         yield _closest_of_mesh(scene, scene.mesh, ray, active, skip)
-    for index, (facet, blocks) in enumerate(zip(scene.facets, scene.blockers, strict=True)):
+    for index, (facet, blocks) in enumerate(
+        zip(scene.facets, scene.blockers, strict=True), start=scene.first_facet
+    ):
         number = index if index < scene.first_sphere else index + scene.sphere_count
         if blocks or skip is None:
             met, t = _meet_facet(ray, facet)
@@ -171,6 +180,9 @@ def _surface(
     shading_normal = facing
     if features.interpolated_normals:
         shading_normal = _interpolated_normal(scene, point, facing, primitive, valid)
+    if scene.reach is not None:
+        in_mesh = valid & (primitive < scene.first_sphere)
+        reach = dr.maximum(reach, dr.gather(type(t), scene.reach, primitive, in_mesh))
     spawn = dr.fma(facing, SPAWN_OFFSET * reach, point)
     return Hit(valid, t, primitive, spawn, facing, shading_normal, front)
 

@@ -94,12 +94,12 @@ class Launcher:
             i: UInt32, total: Array3f64, rays: UInt32, non_finite: UInt32
         ) -> tuple[UInt32, Array3f64, UInt32, UInt32]:
             radiance, traced = self._sample(self.sampler(pixel, first_sample + i, seed))
-            finite = dr.isfinite(dr.sum(radiance))
+            x, y, z = (dr.isfinite(channel) for channel in radiance)
             return (
                 i + replicates,
                 total + types.Array3f64(radiance),
                 rays + traced,
-                non_finite + dr.select(finite, 0, 1),
+                non_finite + dr.select(x & y & z, 0, 1),
             )
 
         zeros = (dr.zeros(t, len(lane)) for t in (types.Array3f64, types.UInt32, types.UInt32))
@@ -116,7 +116,7 @@ class Launcher:
             dr.kernel_history_clear()
             self.launch(range(1), range(0), 1, 0)
             kernels = dr.kernel_history((dr.KernelType.JIT,))
-        return max(kernel["operation_count"] for kernel in kernels)
+        return max((kernel["operation_count"] for kernel in kernels), default=0)
 
 
 def make_launcher(

@@ -124,7 +124,7 @@ class Tracer:
             return path._replace(radiance=radiance, rays=rays)
         direction, weight = self._next_direction(brdf, sampler, depth)
         beta = path.beta * weight
-        active = hit.valid & (dr.max(beta) > 0)
+        active = hit.valid & ~(dr.max(beta) <= 0)  # not a number goes on, to be counted
         pdf = brdf.pdf(direction) if features.mis else path.pdf
         return Path(hit.point, direction, active, beta, pdf, radiance, rays)
 
@@ -153,7 +153,7 @@ class Tracer:
         value = brdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
         if features.mis:
             value *= power_heuristic(brdf.pdf(sample.direction) * sample.inverse_pdf)
-        traced = hit.valid & (dr.max(value) > 0)
+        traced = hit.valid & ~(dr.max(value) <= 0)
         shadow = occluded(scene, Ray(hit.point, sample.direction), sample.distance, light, traced)
         return dr.select(traced & ~shadow, value, 0), traced
 

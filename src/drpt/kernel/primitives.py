@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.facets import Facet, bounds, has_area, make_facet, merge_coplanar
+from drpt.kernel.facets import bounds, has_area, make_facet, merge_coplanar
 from drpt.scene import Diffuse, Mesh, Phong, Sphere
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from drpt.kernel.facets import Facet
     from drpt.scene import Scene, Shape
 
     Array: TypeAlias = NDArray[np.float64]
@@ -41,12 +42,12 @@ class Primitives:
     ----------
     origin
         The point (3,) that everything else is relative to; 0 unless the scene is far from it.
-    facets
-        Where they are few, the flat ones, the smooth ones and the lights; else none.
-    triangles
-        Where they are many, the same ones as corners (n, 3, 3); else none.
     planes
-        Row (normal, offset) of each facet or triangle.
+        Row (normal, offset) of each triangle or polygon.
+    triangles
+        Where they are many, the corners (n, 3, 3) of the first n of them, for a mesh; else none.
+    facets
+        The others.
     smooth_corners, smooth_normals
         Corners and their normals (n, 3, 3) of the triangles with interpolated normals.
     light_corners
@@ -62,9 +63,9 @@ class Primitives:
     """
 
     origin: Array
-    facets: tuple[Facet, ...]
-    triangles: Array
     planes: Array
+    triangles: Array
+    facets: tuple[Facet, ...]
     smooth_corners: Array
     smooth_normals: Array
     light_corners: Array
@@ -113,10 +114,9 @@ class Primitives:
 
     def blockers(self) -> list[bool]:
         """Whether each facet can stand between two points of the scene."""
-        if not self.facets:
-            return []
-        corners = [f.corners for f in self.facets]
-        points = np.concatenate([*corners, self.spheres[:, :3]])
+        if len(self.triangles):
+            return [True] * len(self.facets)
+        points = np.concatenate([*(f.corners for f in self.facets), self.spheres[:, :3]])
         radii = np.zeros(len(points))
         radii[len(points) - len(self.spheres) :] = self.spheres[:, 3]
         return [not bounds(facet, points, radii) for facet in self.facets]
@@ -129,23 +129,27 @@ def make_primitives(scene: Scene) -> Primitives:
     spheres = [shape for shape in scene.shapes if isinstance(shape, Sphere)]
     flat = [_part(m, origin) for m in meshes if not m.is_light and m.normals is None]
     smooth = [_part(m, origin) for m in meshes if not m.is_light and m.normals is not None]
-    lit = [_part(m, origin) for m in meshes if m.is_light]
-    flat, facets = _unrolled(flat, [*smooth, *lit], np.subtract(scene.camera.eye, origin))
-    parts = [*flat, *smooth, *lit]
     dull_spheres = [_Part(s, _row(s, origin)) for s in spheres if not s.is_light]
-    lit_spheres = [_Part(s, _row(s, origin)) for s in spheres if s.is_light]
+    light_corners, triangle_radiance = _lights(
+        [_part(m, origin) for m in meshes if m.is_light], 3, 3
+    )
+    light_spheres, sphere_radiance = _lights(
+        [_Part(s, _row(s, origin)) for s in spheres if s.is_light], 4
+    )
+    flat, facets = _unrolled(flat, smooth, light_corners)
+    corners = np.concatenate([*map(_triangles, (*flat, *smooth)), light_corners])
     return Primitives(
         origin=origin,
+        planes=_planes(corners),
+        triangles=corners[: len(corners) - len(facets)],
         facets=facets,
-        triangles=_joined([] if facets else parts, 3, 3),
-        planes=_planes(_joined([p._replace(primitives=_triangles(p)) for p in parts], 3, 3)),
         smooth_corners=_joined(smooth, 3, 3),
         smooth_normals=np.concatenate([np.empty((0, 3, 3)), *(part.normals for part in smooth)]),
-        light_corners=_joined(lit, 3, 3),
-        spheres=_joined([*dull_spheres, *lit_spheres], 4),
-        sphere_lights=len(lit_spheres),
+        light_corners=light_corners,
+        spheres=np.concatenate([_joined(dull_spheres, 4), light_spheres]),
+        sphere_lights=len(light_spheres),
         reflectance=_rows([*flat, *smooth, *dull_spheres], _reflectance, 4),
-        radiance=_rows([*lit_spheres, *lit], lambda shape: shape.radiance or (), 3),
+        radiance=np.concatenate([sphere_radiance, triangle_radiance]),
     )
 
 
@@ -170,17 +174,45 @@ def _part(mesh: Mesh, origin: Array) -> _Part:
 
 
 def _unrolled(
-    flat: list[_Part], others: list[_Part], eye: Array
+    flat: list[_Part], smooth: list[_Part], lights: Array
 ) -> tuple[list[_Part], tuple[Facet, ...]]:
-    """Facets, and the flat parts with coplanar triangles merged; no facets if they are many."""
-    if sum(len(part.primitives) for part in (*flat, *others)) > MERGE_LIMIT:
-        return flat, ()
+    """The flat parts, coplanar triangles merged, and facets of all, where those are few.
+
+    Else the facets are of the lights alone, or none, where those are many, too.
+    """
+    emitting = tuple(map(make_facet, lights)) if len(lights) <= UNROLL_LIMIT else ()
+    if sum(len(part.primitives) for part in (*flat, *smooth)) + len(lights) > MERGE_LIMIT:
+        return flat, emitting
     merged = [part._replace(primitives=merge_coplanar(part.primitives)) for part in flat]
-    polygons = [polygon for part in (*merged, *others) for polygon in part.primitives]
-    if len(polygons) > UNROLL_LIMIT:
-        return flat, ()
-    reach = float(np.abs(np.concatenate([*polygons, [eye]])).max())
-    return merged, tuple(make_facet(polygon, reach) for polygon in polygons)
+    polygons = [polygon for part in (*merged, *smooth) for polygon in part.primitives]
+    if len(polygons) + len(lights) > UNROLL_LIMIT:
+        return flat, emitting
+    return merged, (*map(make_facet, polygons), *emitting)
+
+
+def _lights(parts: list[_Part], *shape: int) -> tuple[Array, Array]:
+    """Primitives (n, *shape) that emit, and their radiance (n, 3): the sum of coincident ones."""
+    primitives = _joined(parts, *shape)
+    radiance = _rows(parts, lambda shape: shape.radiance or (), 3)
+    first, owner = _coincident(primitives.reshape(-1, *(shape if len(shape) > 1 else (1, *shape))))
+    total = np.zeros((len(first), 3))
+    np.add.at(total, owner, radiance)
+    order = np.argsort(first)
+    return primitives[first[order]], total[order]
+
+
+def _coincident(corners: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First of each group of polygons (n, corners, 3) that are the same from some corner on.
+
+    Returns its number, and the group of each polygon.
+    """
+    count = corners.shape[1]
+    _, points = np.unique(corners.reshape(-1, corners.shape[2]), axis=0, return_inverse=True)
+    points = points.reshape(-1, count)
+    turns = (points.argmin(axis=1)[:, None] + np.arange(count)) % count
+    turned = np.take_along_axis(points, turns, axis=1)
+    _, first, group = np.unique(turned, axis=0, return_index=True, return_inverse=True)
+    return first, group.reshape(-1)
 
 
 def _row(sphere: Sphere, origin: Array) -> Array:
@@ -226,7 +258,10 @@ def _origin(shapes: tuple[Shape, ...]) -> Array:
     """
     low = np.min([_box(shape)[0] for shape in shapes], axis=0)
     high = np.max([_box(shape)[1] for shape in shapes], axis=0)
-    grid = 2.0 ** np.ceil(np.log2(np.linalg.norm(high - low)))
+    extent = np.linalg.norm(high - low)
+    if extent == 0:
+        return np.asarray(low)
+    grid = 2.0 ** np.ceil(np.log2(extent))
     return np.asarray(grid * np.round((low + high) / 2 / grid))
 
 
