@@ -247,8 +247,10 @@ class TestIndependence:
             launcher.launch(range(16), range(start, start + 64), 1, 0).radiance
             for start in (0, 2**32, 2**33, 2**34)
         ]
+        lit = images[0] > 0
+        assert lit.any()
         for a, b in itertools.combinations(images, 2):
-            assert (a != b).mean() > 0.5
+            assert (a != b)[lit].mean() > 0.5
 
 
 def assert_uncorrelated(columns: Floats) -> None:

@@ -8,6 +8,7 @@ import ctypes
 import importlib
 import os
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -53,15 +54,16 @@ def load(name: str | None = None) -> ModuleType:
     BackendError
         The backend cannot work here; the message says what to do.
     """
+    what = "backend" if name else VARIABLE
     name = name or os.environ.get(VARIABLE) or None
     if name not in (None, *NAMES):
-        raise ValueError(f"backend must be one of {', '.join(NAMES)}, got {name!r}")
+        raise ValueError(f"{what} must be one of {', '.join(NAMES)}, got {name!r}")
     if "drjit" not in sys.modules:
         _name_library(optional=name != "llvm" and _has_cuda_driver())
         _import_drjit()
     name = name or ("cuda" if _works("CUDA") else "llvm")
     if name == "cuda" and not _works("CUDA"):
-        raise BackendError("backend cuda needs an NVIDIA GPU and its driver, none was found")
+        raise BackendError(f"{what} is cuda, which needs an NVIDIA GPU and its driver: none found")
     if name == "llvm":
         _check_loaded_llvm()
     return importlib.import_module(f"drjit.{name}")
@@ -111,9 +113,17 @@ def _import_drjit() -> None:
     try:
         importlib.import_module("drjit")
     except (ImportError, NameError) as error:  # the latter: Dr.Jit 1.5 fails to report the former
-        raise BackendError(
-            f"Dr.Jit cannot be imported ({error.__context__ or error}); it needs libatomic1"
-        ) from error
+        causes = list(_causes(error))
+        if any(isinstance(cause, KeyboardInterrupt) for cause in causes):
+            raise KeyboardInterrupt from None
+        hint = "; it needs libatomic1" if "libatomic" in str(causes[-1]) else ""
+        raise BackendError(f"Dr.Jit cannot be imported ({causes[-1]}){hint}") from error
+
+
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    while error:
+        yield error
+        error = error.__cause__ or error.__context__
 
 
 def _works(name: str) -> bool:

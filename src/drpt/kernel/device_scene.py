@@ -90,7 +90,8 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     """Put the primitives on the device, as arrays of the backend ``types``."""
 
     def array(values: NDArray[np.float64]) -> Float:
-        return types.Float32(values.astype(np.float32).ravel())
+        mapped = types.Float32(values.astype(np.float32).ravel())
+        return _own_copy(mapped) if len(mapped) else mapped
 
     cdf = primitives.light_cdf()
     pmf = np.diff(cdf, prepend=0)
@@ -122,6 +123,17 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         light_count=len(pmf),
         sphere_lights=primitives.sphere_lights,
     )
+
+
+def _own_copy(mapped: Float) -> Float:
+    """Copy an array that still is NumPy's memory into Dr.Jit's.
+
+    Rows are gathered in one piece from aligned memory only, and element by element from other:
+    where NumPy's memory happens to lie would decide which kernel is compiled.
+    """
+    copy = mapped * dr.opaque(type(mapped), 1)
+    dr.eval(copy)
+    return copy
 
 
 def _ball(row: NDArray[np.float64], types: ModuleType) -> Ball:
