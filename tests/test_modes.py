@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from itertools import combinations
 from math import log2
 from typing import TYPE_CHECKING
@@ -30,8 +31,10 @@ PATHS = 2**24
 # The bias of a picture's reflected light, relative to its mean, that is seen with so many paths in
 # the order of MODES. Paths find a small light by chance only, a sharp plate hardly by a uniform
 # direction, and in `veach` a sharp plate's light is not found by sampling lights: there the modes
-# are compared as far as it goes, and the closed forms decide.
-DETECTABLE = {
+# are compared as far as it goes, and the closed forms decide. Uniform directions into the sharpest
+# lobes of `veach` meet a light once in millions, which no affordable number of paths measures: that
+# mode is compared on the same plates, duller.
+DETECTABLE: dict[str, tuple[float | None, ...]] = {
     "cornell-box": (0.03, 0.015, 0.018, 0.002, 0.002),
     "cornell-box-glossy": (0.1, 0.015, 0.03, 0.01, 0.004),
     "cornell-box-medium-light": (0.07, 0.03, 0.012, 0.002, 0.002),
@@ -39,8 +42,9 @@ DETECTABLE = {
     "furnace": (0.008, 0.003, 0.006, 0.001, 0.001),
     "many-lights": (0.08, 0.02, 0.2, 0.05, 0.01),
     "spheres": (0.5, 0.03, 0.07, 0.05, 0.015),
-    "veach": (0.9, 0.015, 0.6, 0.6, 0.01),
+    "veach": (None, 0.015, 0.6, 0.6, 0.01),
 }
+DULL_VEACH = (0.4, 0.02, 0.05, 0.03, 0.015)
 MARGIN = 1.2  # of what is detected, since the noise itself is estimated
 # For changes of a scene that leave its picture as it is, in mode mis.
 UNCHANGED = 0.01
@@ -51,23 +55,43 @@ CORNELL_MEAN = (0.89779, 0.90146, 0.82165)
 CORNELL_TOLERANCE = 5e-4
 
 
-def assert_modes_agree(name: str, paths: int) -> None:
-    scene = with_picture(drpt.load_scene(name), 48, 32)
-    found = [measure(scene, paths, 2, mode, reflected=True) for mode in MODES]
-    detectable = np.sqrt(PATHS / paths) * np.array(DETECTABLE[name])
-    for a, b in combinations(range(len(MODES)), 2):
-        assert_agree(found[a], found[b], MARGIN * np.hypot(detectable[a], detectable[b]))
+def assert_modes_agree(scene: drpt.Scene, paths: int, detectable: tuple[float | None, ...]) -> None:
+    small = with_picture(scene, 48, 32)
+    measured = [
+        (measure(small, paths, 2, mode, reflected=True), np.sqrt(PATHS / paths) * bias)
+        for mode, bias in zip(MODES, detectable, strict=True)
+        if bias is not None
+    ]
+    for (a, bias_a), (b, bias_b) in combinations(measured, 2):
+        assert_agree(a, b, MARGIN * np.hypot(bias_a, bias_b))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DETECTABLE)
 def test_modes_agree(name: str) -> None:
-    assert_modes_agree(name, PATHS)
+    assert_modes_agree(drpt.load_scene(name), PATHS, DETECTABLE[name])
+
+
+@pytest.mark.slow
+def test_modes_agree_on_duller_plates() -> None:
+    assert_modes_agree(duller(drpt.load_scene("veach"), 100), PATHS, DULL_VEACH)
+
+
+def duller(scene: drpt.Scene, factor: float) -> drpt.Scene:
+    """The same scene of flat meshes and lights, its exponents divided."""
+
+    def dull(shape: Shape) -> Shape:
+        if isinstance(shape, drpt.Mesh) and isinstance(shape.material, drpt.Phong):
+            material = drpt.Phong(shape.material.albedo, shape.material.exponent / factor)
+            return replace(shape, material=material)
+        return shape
+
+    return replace(scene, shapes=tuple(map(dull, scene.shapes)))
 
 
 @pytest.mark.parametrize("name", ["cornell-box", "furnace"])
 def test_modes_agree_as_far_as_few_paths_tell(name: str) -> None:
-    assert_modes_agree(name, PATHS // 8)
+    assert_modes_agree(drpt.load_scene(name), PATHS // 8, DETECTABLE[name])
 
 
 def test_every_builtin_scene_is_compared() -> None:
