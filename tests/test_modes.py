@@ -202,6 +202,69 @@ def test_black_and_unlit_shapes_out_of_sight_change_nothing(reference: Measured)
     assert_unchanged(small_scene([*reflecting(), *lights(), *below]), reference)
 
 
+def panelled_room(*extra: Shape) -> drpt.Scene:
+    """A closed room with a panel of light flush with its ceiling, and a panel on its floor."""
+    camera = drpt.Camera((0, 1, -0.9), (0, 1, 0), (0, 1, 0), 60, 32, 32)
+    return drpt.Scene(camera, [*room(), *panels(), *extra])
+
+
+def room() -> list[Shape]:
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (0, 2) for z in (-1.0, 1)])
+    quads = [[0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6], [1, 3, 7, 5], [0, 2, 6, 4]]
+    faces = [[q[0], q[i], q[i + 1]] for q in quads for i in (1, 2)]
+    return [drpt.Mesh(corners, faces, material=drpt.Diffuse(0.6))]
+
+
+def panels(radiance: float = 5) -> list[Shape]:
+    below = np.array([[-0.3, 0, -0.3], [-0.3, 0, 0.3], [0.3, 0, 0.3], [0.3, 0, -0.3]])
+    above = below[::-1] + np.array([0, 2, 0])
+    quad = [[0, 1, 2], [0, 2, 3]]
+    return [drpt.Mesh(corners, quad, radiance=radiance) for corners in (below, above)]
+
+
+def crumbs() -> drpt.Mesh:
+    """So many small triangles in a corner that all of a scene goes into a mesh."""
+    corners = np.random.default_rng(0).normal(0.7, 0.02, (300, 3))
+    return drpt.Mesh(corners, np.arange(300).reshape(-1, 3), material=drpt.Diffuse(0.6))
+
+
+@pytest.mark.parametrize("extra", [(), (crumbs(),)], ids=["facets", "mesh"])
+def test_modes_agree_on_lights_flush_with_a_surface(extra: tuple[Shape, ...]) -> None:
+    scene = panelled_room(*extra)
+    truth = measure_to(UNCHANGED * 0.7, scene, 2, "mis")
+    for mode in ("implicit", "explicit"):
+        assert_agree(measure_to(UNCHANGED * 0.7, scene, 2, mode, seed=5), truth, UNCHANGED * 1.1)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_coincident_lights_are_one_of_their_sum(mode: str) -> None:
+    lamp, whole = (drpt.Sphere((0, 1.5, 0.2), 0.2, radiance=r) for r in (5, 10))
+    camera = panelled_room().camera
+    halves = drpt.Scene(camera, [*room(), *panels(2), lamp, *panels(3), lamp])
+    once = drpt.Scene(camera, [*room(), *panels(5), whole])
+    pictures = [drpt.render(scene, 16, 2, mode).image for scene in (halves, once)]
+    assert pictures[0] == pytest.approx(pictures[1], rel=1e-5)
+
+
+@pytest.mark.parametrize("size", [1, 10, 100])
+def test_large_triangles_do_not_shade_themselves_in_a_mesh(size: float) -> None:
+    """A tilted square through the origin, seen from above, with and without a mesh below it."""
+    normal = np.array([0.3, 0.9, 0.31]) / np.linalg.norm([0.3, 0.9, 0.31])
+    along = np.cross(normal, [1, 0, 0]) / np.linalg.norm(np.cross(normal, [1, 0, 0]))
+    across = np.cross(along, normal)
+    corners = [size * (a * along + b * across) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    square = drpt.Mesh(corners, [[0, 1, 2], [0, 2, 3]], material=drpt.Diffuse(0.6))
+    lamp = drpt.Sphere(3 * normal + across, 0.5, radiance=5)
+    camera = drpt.Camera(normal + 0.3 * along, (0, 0, 0), along, 40, 32, 32)
+    below = replace(crumbs(), vertices=crumbs().vertices - 2 * size * normal)
+    pictures = [
+        drpt.render(drpt.Scene(camera, [square, lamp, *extra]), 16, 1, "explicit").image
+        for extra in ((), (below,))
+    ]
+    assert pictures[0].all()
+    assert pictures[1] == pytest.approx(pictures[0], rel=1e-3)
+
+
 def transformed(turn: Floats, scale: float = 1.0, shift: Floats | None = None) -> drpt.Scene:
     """The small scene, its camera too, turned, scaled and shifted."""
     scene = small_scene()
