@@ -92,6 +92,9 @@ BAD_FLAGS = {
     "spp 0": (["--spp", "0"], ("spp", "0")),
     "spp not a number": (["--spp", "many"], ("--spp: 'many' is not an integer",)),
     "spp a fraction": (["--spp", "1.5"], ("--spp: '1.5' is not an integer",)),
+    "spp in Python's way": (["--spp", "1_0"], ("--spp: '1_0' is not an integer",)),
+    "spp in Arabic": (["--spp", "٣"], ("--spp: '٣' is not an integer",)),
+    "spp too long": (["--spp", "1" * 5000], ("is not an integer",)),
     "bounces": (["--bounces", "-1"], ("bounces", "-1")),
     "width": (["--width", "0"], ("width", "0")),
     "height": (["--height", "-2"], ("height", "-2")),
@@ -390,6 +393,21 @@ class TestRender:
         fake.on_pass = fail
         assert cli.render_main(["good.toml"]) == 1
         assert capsys.readouterr() == ("", f"drpt-render: error: {error}\n")
+
+    @pytest.mark.parametrize("argv", [["--help"], ["render", "--version"], ["scenes"]])
+    @pytest.mark.parametrize("unbuffered", ["", "1"])
+    def test_text_that_nobody_gets_is_a_failed_run(self, argv: list[str], unbuffered: str) -> None:
+        with Path("/dev/full").open("w") as full:
+            run = subprocess.run(
+                [sys.executable, "-m", "drpt", *argv],
+                stdout=full,
+                stderr=subprocess.PIPE,
+                text=True,
+                env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+                check=False,
+            )
+        assert run.returncode != 0
+        assert "error: [Errno 28] No space left on device" in run.stderr
 
     def test_an_interrupt_leaves_no_picture(
         self, fake: FakeRendering, capsys: pytest.CaptureFixture[str]

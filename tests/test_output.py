@@ -9,7 +9,7 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import OpenEXR
@@ -220,6 +220,16 @@ class TestCheckTarget:
         with pytest.raises(ValueError, match=r"exposure: .* stops from -100 to 100"):
             check_target(tmp_path / "a.png", exposure=exposure)
 
+    @pytest.mark.parametrize("exposure", ["1", None, 1j])
+    def test_refuses_an_exposure_that_is_no_number(self, tmp_path: Path, exposure: Any) -> None:
+        with pytest.raises(ValueError, match=r"exposure: .* stops from -100 to 100"):
+            check_target(tmp_path / "a.png", exposure=exposure)
+
+    @pytest.mark.parametrize("path", [None, 3, b"a.png"])
+    def test_refuses_what_is_no_path(self, path: Any) -> None:
+        with pytest.raises(ValueError, match="must be the path of a picture"):
+            check_target(path)
+
     def test_refuses_a_missing_folder(self, tmp_path: Path) -> None:
         with pytest.raises(FileNotFoundError, match=r"the folder .*missing does not exist"):
             check_target(tmp_path / "missing" / "a.exr")
@@ -232,6 +242,20 @@ class TestCheckTarget:
     def test_refuses_a_folder_as_picture(self, tmp_path: Path) -> None:
         (tmp_path / "a.exr").mkdir()
         with pytest.raises(IsADirectoryError, match="this is a folder"):
+            check_target(tmp_path / "a.exr")
+
+    @pytest.mark.parametrize("link", [False, True])
+    def test_refuses_a_pipe_as_picture(self, tmp_path: Path, link: bool) -> None:
+        path = tmp_path / "a.exr"
+        os.mkfifo(tmp_path / "pipe" if link else path)
+        if link:
+            path.symlink_to(tmp_path / "pipe")
+        with pytest.raises(OSError, match="a pipe or a device, and a picture must be a file"):
+            check_target(path)
+
+    def test_refuses_a_link_into_a_missing_folder(self, tmp_path: Path) -> None:
+        (tmp_path / "a.exr").symlink_to(tmp_path / "missing" / "a.exr")
+        with pytest.raises(FileNotFoundError, match=r"the folder .*missing does not exist"):
             check_target(tmp_path / "a.exr")
 
     def test_refuses_a_folder_without_permission(
@@ -297,6 +321,12 @@ class TestReplacing:
         write(link, grey(0), {})
         assert link.is_symlink()
         assert path.is_file()
+
+
+def test_importing_loads_no_library_of_pictures() -> None:
+    code = "import sys, drpt.output; print({'PIL', 'OpenEXR'} & set(sys.modules))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "set()\n"
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peak memory is read in /proc")

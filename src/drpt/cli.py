@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -45,20 +46,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     SystemExit
         With status 2 on bad usage or a bad scene, with 0 after ``--help`` and ``--version``.
     """
-    args, unknown = _parser().parse_known_args(argv)
-    if unknown:
-        args.parser.error(f"unknown arguments: {' '.join(unknown)}")
+    program = "drpt"
     try:
+        args = _parse(argv)
+        program = args.parser.prog
         status: int = args.run(args)
         print(end="", flush=True)
     except KeyboardInterrupt:
-        _say(f"{args.parser.prog}: interrupted")
+        _say(f"{program}: interrupted")
         return INTERRUPTED
     except BrokenPipeError:
         _drop_stdout()
         return 0
     except (OSError, MemoryError, backend.BackendError) as error:
-        _say(f"{args.parser.prog}: error: {error}")
+        _say(f"{program}: error: {error}")
         return FAILED
     return status
 
@@ -66,6 +67,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 def render_main(argv: Sequence[str] | None = None) -> int:
     """Run `drpt-render`, which is `drpt render`, and return its exit status."""
     return main(["render", *(sys.argv[1:] if argv is None else argv)])
+
+
+def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    args, unknown = _parser().parse_known_args(argv)
+    if unknown:
+        args.parser.error(f"unknown arguments: {' '.join(unknown)}")
+    return args
 
 
 class _Parser(argparse.ArgumentParser):
@@ -79,6 +87,9 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         _say(f"{self.prog}: error: {message.removeprefix('argument ')}")
         sys.exit(BAD_INPUT)
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        print(message, end="", file=file, flush=True)  # argparse would swallow an OSError
 
 
 def _parser() -> _Parser:
@@ -240,10 +251,10 @@ def _add_version(parser: _Parser) -> None:
 
 
 def _integer(text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not an integer") from None
+    with suppress(ValueError):  # Python reads no thousands of digits
+        if re.fullmatch("[+-]?[0-9]+", text):
+            return int(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is not an integer")
 
 
 def _thread_count(text: str) -> int:
@@ -327,7 +338,7 @@ def _run(rendering: Rendering, *, progress: bool) -> Result:
     return rendering.result()
 
 
-def _with_progress(rendering: Rendering, passes: Iterator[float]) -> Iterator[float]:
+def _with_progress(rendering: Rendering, passes: Iterator[int]) -> Iterator[int]:
     """Draw a bar on stderr while the passes run; it vanishes after the last."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn

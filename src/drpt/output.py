@@ -6,12 +6,11 @@ import json
 import os
 import secrets
 from contextlib import contextmanager
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
-import OpenEXR
-from PIL import Image, PngImagePlugin
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -32,19 +31,24 @@ def check_target(path: str | os.PathLike[str], *, exposure: float = 0.0) -> None
     Raises
     ------
     ValueError
-        The suffix names no known format, or the exposure is not in ±100 stops.
+        `path` is no path, its suffix names no known format, or the exposure is not in ±100 stops.
     OSError
-        The folder is missing, is no folder or may not be written to, or `path` is a folder.
+        The folder is missing, is no folder or may not be written to, or what is there is no file.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise ValueError(f"{path!r} is not allowed; it must be the path of a picture")
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f"{path}: the name of a picture must end with {', '.join(SUFFIXES)}")
-    if not abs(exposure) <= MAX_STOPS:
+    if not isinstance(exposure, Real) or not abs(exposure) <= MAX_STOPS:
         allowed = f"a number of stops from {-MAX_STOPS:g} to {MAX_STOPS:g}"
-        raise ValueError(f"exposure: {exposure} is not allowed; it must be {allowed}")
-    if path.is_dir():
+        raise ValueError(f"exposure: {exposure!r} is not allowed; it must be {allowed}")
+    target = _target(path)
+    if target.is_dir():
         raise IsADirectoryError(f"{path}: this is a folder, and a picture must be a file")
-    folder = path.parent
+    if target.exists() and not target.is_file():
+        raise OSError(f"{path}: this is a pipe or a device, and a picture must be a file")
+    folder = target.parent
     if not folder.exists():
         raise FileNotFoundError(f"{path}: the folder {folder} does not exist")
     if not folder.is_dir():
@@ -110,6 +114,8 @@ def read_exr(
     ValueError
         It is not an EXR file with the channels R, G and B.
     """
+    import OpenEXR
+
     with open(path, "rb") as stream:
         try:
             file = OpenEXR.File(stream, separate_channels=True)
@@ -127,10 +133,15 @@ def read_exr(
     return image.astype(np.float32, copy=False), metadata
 
 
+def _target(path: Path) -> Path:
+    """Return the file behind a link, whether it exists or not; else the path as it is."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
 @contextmanager
 def _replacing(path: Path) -> Iterator[BinaryIO]:
     """Open a new file that takes the place of `path` once it is written without an error."""
-    target = path.resolve()
+    target = _target(path)
     temporary = target.with_name(f".drpt-{secrets.token_hex(8)}.tmp")
     try:
         with open(temporary, "xb") as stream:
@@ -145,6 +156,8 @@ def _replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def _write_exr(stream: BinaryIO, image: NDArray[np.float32], header: dict[str, str]) -> None:
+    import OpenEXR
+
     layout = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
     OpenEXR.File({**layout, **header}, {"RGB": image}).write(stream)
 
@@ -152,6 +165,8 @@ def _write_exr(stream: BinaryIO, image: NDArray[np.float32], header: dict[str, s
 def _write_png(
     stream: BinaryIO, image: NDArray[np.float32], header: dict[str, str], exposure: float
 ) -> None:
+    from PIL import Image, PngImagePlugin
+
     chunks = PngImagePlugin.PngInfo()
     for name, text in header.items():
         chunks.add_text(name, text)

@@ -150,14 +150,16 @@ class Rendering:
     def passes(self) -> Iterator[int]:
         """Run the passes that have not run yet; yields after each the samples per pixel so far."""
         start = perf_counter() - self._seconds
-        launcher = self.launcher()
+        with backend.interrupts_put_off():
+            launcher = self.launcher()
         pixels = len(self._film.mean)
         for samples in plan_passes(pixels, self.spp):
             if samples.start < self._done:
                 continue
             for part in _parts(pixels):
                 replicates = min(len(samples), max(1, LAUNCH_LANES // len(part)))
-                sums = launcher.launch(part, samples, replicates, self.seed)
+                with backend.interrupts_put_off():
+                    sums = launcher.launch(part, samples, replicates, self.seed)
                 self._film.add(part, sums.radiance, len(samples))
                 self._rays += sums.rays
                 self._non_finite += sums.non_finite

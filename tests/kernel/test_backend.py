@@ -1,6 +1,7 @@
 """Each test runs in a process of its own: a process chooses its LLVM once."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -105,9 +106,61 @@ def test_environment_names_the_backend() -> None:
     assert "drjit.llvm" in last_line(done)
 
 
-def test_unknown_backend_is_an_error() -> None:
-    with pytest.raises(ValueError, match="must be one of llvm, cuda, got 'metal'"):
+def test_unknown_backend_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="backend must be one of llvm, cuda, got 'metal'"):
         backend.load("metal")
+    monkeypatch.setenv(backend.VARIABLE, "metal")
+    with pytest.raises(ValueError, match="DRPT_BACKEND must be one of llvm, cuda, got 'metal'"):
+        backend.load()
+
+
+def test_cuda_without_a_gpu_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backend, "_works", lambda name: name != "CUDA")
+    monkeypatch.setenv(backend.VARIABLE, "cuda")
+    with pytest.raises(backend.BackendError, match="DRPT_BACKEND is cuda, which needs an NVIDIA"):
+        backend.load()
+
+
+@pytest.mark.parametrize(
+    ("reason", "says"),
+    [
+        ("libatomic.so.1: no such file", r"libatomic\.so\.1: no such file\); it needs libatomic1$"),
+        ("undefined symbol: x", r"cannot be imported \(undefined symbol: x\)$"),
+    ],
+)
+def test_failed_import_says_why(reason: str, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(name: str) -> None:
+        raise ImportError(reason)
+
+    monkeypatch.delitem(sys.modules, "drjit")
+    monkeypatch.setattr("importlib.import_module", fail)
+    with pytest.raises(backend.BackendError, match=says):
+        backend.load("llvm")
+
+
+def test_interrupt_waits_until_drjit_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+
+    def be_interrupted(name: str) -> None:
+        signal.raise_signal(signal.SIGINT)
+        done.append(name)
+
+    monkeypatch.delitem(sys.modules, "drjit")
+    monkeypatch.setattr("importlib.import_module", be_interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        backend.load("llvm")
+    assert done == ["drjit"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_loading_in_a_thread() -> None:
+    done = run(
+        "import threading\n"
+        "from drpt.kernel import backend\n"
+        "thread = threading.Thread(target=lambda: print(backend.load('llvm').__name__))\n"
+        "thread.start(); thread.join()"
+    )
+    assert last_line(done) == "drjit.llvm"
 
 
 def test_thread_count_must_be_positive() -> None:

@@ -146,7 +146,10 @@ LIGHT = SPHERE + "radiance = 1\n"
         (f"{CAMERA}{TRIANGLE.replace('2', '3')}radiance = 1", "shapes[0].faces[0]: (0, 1, 3)"),
         (f"{CAMERA}{TRIANGLE.replace('2', '2.0')}radiance = 1", "shapes[0].faces: an array of"),
         (f"{CAMERA}{WHITE}{SPHERE}material = 'wite'", "(did you mean 'white'?); it must be one"),
-        (f"{CAMERA}{SPHERE}material = 'white'", "shapes[0].material: there is no material 'white'"),
+        (
+            f"{CAMERA}{SPHERE}material = 'white'",
+            "shapes[0].material: there is no material 'white'; it must be a table",
+        ),
         (f"{CAMERA}{SPHERE}material = 3", "shapes[0].material: 3 is not allowed"),
         (f"{CAMERA}{SPHERE}material = {{}}", "shapes[0].material.type: this key is missing"),
         (f"{CAMERA}{LIGHT}{WHITE}exponent = 3", "materials.white.exponent: there is no key"),
@@ -204,8 +207,10 @@ def test_unknown_names() -> None:
     message = refusal("cornel-box")
     assert "there is no scene 'cornel-box' (did you mean 'cornell-box'?)" in message
     assert all(name in message for name in builtin_names())
-    for name in ["", "zzz", None, 3, b"furnace"]:
+    for name in ["zzz", None, 3, b"furnace", "a" * 5000, "a" * 5000 + "/b"]:
         refusal(name)
+    assert len(refusal("a" * 5000)) < 500
+    assert refusal("").startswith("there is no scene ''; it must be one of")
 
 
 def colours(most: float) -> Any:

@@ -1,5 +1,8 @@
+import io
 import struct
 from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -50,6 +53,9 @@ def positions(*faces: list[int]) -> list[list[list[float]]]:
         ("f 1 2 3", [[0, 1, 2]]),
         ("f 1/1 2/2 3/1", [[0, 1, 2]]),
         ("f 1 2 3 # comment", [[0, 1, 2]]),
+        ("f -5 -4/-1 -3/1", [[0, 1, 2]]),
+        ("f -5 2 -3\nv 9 9 9\nf -6 -5 -4", [[0, 1, 2], [0, 1, 2]]),
+        ("p 1\nl 1 2\ns off\n# x\nf 1 2 3", [[0, 1, 2]]),
         ("f 1 2 \\\n 3", [[0, 1, 2]]),
         ("\tf  1\t2 3", [[0, 1, 2]]),
         ("f 1 2 4 3", [[0, 1, 3], [3, 2, 0]]),
@@ -69,8 +75,18 @@ def test_obj_in_windows(tmp_path: Path) -> None:
     assert corners(mesh) == positions([0, 1, 2])
 
 
+def test_obj_with_a_byte_order_mark(tmp_path: Path) -> None:
+    mesh = load(tmp_path, "a.obj", f"\ufeff{V}f 1 2 3")
+    assert corners(mesh) == positions([0, 1, 2])
+
+
 @pytest.mark.parametrize(
-    "faces", ["f 1//1 2//1 3//2\nf 1//2 3//1 2//2", "f 1/1/1 2/2/1 3/1/2\nf 1//2 3/1/1 2//2"]
+    "faces",
+    [
+        "f 1//1 2//1 3//2\nf 1//2 3//1 2//2",
+        "f 1/1/1 2/2/1 3/1/2\nf 1//2 3/1/1 2//2",
+        "f 1//-2 2//1 -3/-1/-1\nf -5//-1 3//1 2//2",
+    ],
 )
 def test_obj_normals_belong_to_corners(tmp_path: Path, faces: str) -> None:
     mesh = load(tmp_path, "a.obj", V + VN + faces)
@@ -141,13 +157,20 @@ def test_npz(tmp_path: Path, normals: np.ndarray | None) -> None:
     [
         ("a.stl", "", "must end in .obj, .ply or .npz"),
         ("a.obj", "", "no faces"),
-        ("a.obj", "\0\xff garbage", "no faces"),
+        ("a.obj", "\0\xff garbage", "line 1: '\\x00ÿ' is not allowed"),
+        (
+            "a.obj",
+            f"{V}f 1 2 \\\n3\r\n\rcurv 0 1 2",
+            "line 9: 'curv' is not allowed; it must be one",
+        ),
         ("a.obj", V, "no faces"),
         ("a.obj", f"{V}f 1 2 6", "no readable OBJ file"),
         ("a.obj", "v 0 x 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "no readable OBJ file"),
         ("a.obj", f"{V}f 0 1 2", "'0' is not allowed"),
-        ("a.obj", f"{V}f -1 -2 -3", "'-1' is not allowed"),
-        ("a.obj", f"{V}f 1 2 x", "'x' is not allowed"),
+        ("a.obj", f"{V}f 1 2 -6", "'-6' is not allowed"),
+        ("a.obj", f"{V}f 1 2 -0", "'-0' is not allowed"),
+        ("a.obj", f"{V}{VN}f 1//1 2//1 3//-3", "line 8: '3//-3' is not allowed"),
+        ("a.obj", f"{V}f 1 2 x", "line 6: 'x' is not allowed"),
         ("a.obj", f"{V}f 1 2", "three vertices or more"),
         ("a.obj", f"{V}{VN}f 1//1 2//1 3", "only some of its faces have normals"),
         ("a.obj", f"{V}{VN}f 1//1 2//1 3//1\nf 1 2 3", "only some of its faces have normals"),
@@ -189,7 +212,35 @@ def test_bad_npz(tmp_path: Path) -> None:
         load(tmp_path, "a.npz", whole[: len(whole) // 2])
 
 
+def test_npz_that_claims_too_much(tmp_path: Path) -> None:
+    header = io.BytesIO()
+    shape = {"descr": "<f8", "fortran_order": False, "shape": (10**11, 3)}
+    np.lib.format.write_array_header_1_0(header, shape)
+    with ZipFile(tmp_path / "a.npz", "w") as file:
+        file.writestr("v.npy", header.getvalue())
+    with pytest.raises(SceneError, match=r"a\.npz: it is not an NPZ file of plain arrays"):
+        load_mesh(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize(
+    "faces", [[[0, 1, 3, 2], [0, 1, 2]], [[0, 1, 3, 2], [0, 1, 2], [0, 1, 2, 3, 4]]]
+)
+def test_binary_ply_with_faces_of_several_sizes(tmp_path: Path, faces: list[list[int]]) -> None:
+    rows = b"".join(struct.pack(f"<B{len(f)}i", len(f), *f) for f in faces)
+    head = ply(len(faces), encoding="binary_little_endian").encode()
+    with pytest.raises(SceneError, match="all faces must have the same number of vertices"):
+        load(tmp_path, "a.ply", head + np.array(VERTICES, "<f4").tobytes() + rows)
+
+
+@pytest.mark.parametrize("path", [None, 3, b"x.ply"])
+def test_what_is_no_path(path: Any) -> None:
+    with pytest.raises(SceneError, match="is not allowed; it must be the path of a mesh file"):
+        Mesh.load(path, radiance=1)
+
+
 def test_bad_paths(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="File name too long"):
+        load_mesh("a" * 5000 + ".ply")
     with pytest.raises(SceneError, match="no such file"):
         load_mesh(tmp_path / "no.obj")
     (tmp_path / "folder.obj").mkdir()

@@ -68,6 +68,11 @@ def test_points_and_colours_are_tuples_of_floats(kind: Any) -> None:
     assert all(type(x) is float for x in (*sphere.center, sphere.radius))
 
 
+def test_arrays_without_dimensions_are_numbers() -> None:
+    assert Diffuse(np.array(0.5)) == GREY
+    assert Sphere((0, 0, 0), np.array(2), GREY).radius == 2.0  # type: ignore[arg-type]
+
+
 def test_any_real_number_is_a_number() -> None:
     assert Sphere((0, 0, 0), Fraction(1, 4), GREY).radius == 0.25  # type: ignore[arg-type]
 
@@ -148,9 +153,10 @@ def test_lights() -> None:
 def test_material_from_brdf_params() -> None:
     assert material_from_brdf_params((0.1, 0.2, 0.3, 1)) == Diffuse((0.1, 0.2, 0.3))
     assert material_from_brdf_params(np.array([0.1, 0.2, 0.3, 50])) == Phong((0.1, 0.2, 0.3), 50)
-    for bad in [(1, 1, 1), 5, "1111"]:
+    for bad in [(1, 1, 1), 5, "1111", np.array(1.0)]:
         refusal("brdf_params", material_from_brdf_params, bad)
     refusal("exponent", material_from_brdf_params, (1, 1, 1, -1))
+    refusal("exponent", material_from_brdf_params, np.ones((4, 2)))
     refusal("albedo", material_from_brdf_params, (1, 1, 2, 1))
 
 
@@ -167,7 +173,12 @@ def test_a_refusal_names_value_and_allowed_range() -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [-0.01, 1.01, (0, 0), (0, 0, 2), (0, 0, "1"), "abc", *NOT_NUMBERS]
+    "value",
+    [
+        *(-0.01, 1.01, (0, 0), (0, 0, 2), (0, 0, "1"), "abc", np.array(2), np.array(True)),
+        *({0.1, 0.2, 0.3}, {0: 0, 1: 0, 0.5: 0}, iter((0, 0, 0)), np.zeros((3, 3)), b"\0\0\0"),
+        *NOT_NUMBERS,
+    ],
 )
 @pytest.mark.parametrize("make", [Diffuse, lambda albedo: Phong(albedo, 2)])
 def test_bad_albedo(make: Any, value: object) -> None:
@@ -187,7 +198,10 @@ def test_bad_radiance(value: object) -> None:
     refusal("radiance", Mesh, TRIANGLE, FACES, radiance=value)
 
 
-@pytest.mark.parametrize("value", [(0, 0), (0, 0, 2e9), (0, 0, math.nan), (0, 0, False), 3, "abc"])
+@pytest.mark.parametrize(
+    "value",
+    [(0, 0), (0, 0, 2e9), (0, 0, math.nan), (0, 0, False), 3, "abc", np.array(5.0), {1, 2, 3}],
+)
 @pytest.mark.parametrize("field", ["eye", "target", "up"])
 def test_bad_points(field: str, value: object) -> None:
     refusal(field, camera, **{field: value})
@@ -227,6 +241,7 @@ def test_a_shape_has_one_of_material_and_radiance() -> None:
         ("vertices", [[1, 2, 3], [4, 5]]),
         ("vertices", [["a", "b", "c"]]),
         ("vertices", TRIANGLE > 0),
+        ("vertices", [[0.5, True, 1]]),
         ("vertices", TRIANGLE * 1j),
         ("vertices", None),
         ("vertices", 3),
@@ -248,6 +263,8 @@ def test_bad_vertices(field: str, vertices: object) -> None:
         ("faces", [[0.0, 1.0, 2.0]]),
         ("faces", [[True, False, True]]),
         ("faces", [[0, 1, None]]),
+        ("faces", [[True, 0, 2]]),
+        ("faces", [[np.True_, 0, 2]]),
         ("faces", [[0, 1, 2], [0, 1]]),
         ("faces[0]", [[0, 1, 3]]),
         ("faces[1]", [[0, 1, 2], [0, -1, 2]]),

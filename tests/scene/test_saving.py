@@ -1,5 +1,6 @@
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,6 +59,19 @@ def test_where_nothing_can_be_written(tmp_path: Path) -> None:
         SCENE.save(tmp_path / "no" / "x.toml")
     with pytest.raises(SceneError, match="Is a directory"):
         SCENE.save(tmp_path)
+
+
+@pytest.mark.parametrize("path", ["", None, 3, b"x.toml"])
+def test_what_is_no_path(path: Any) -> None:
+    with pytest.raises(SceneError, match="is not allowed; it must be the path of a scene file"):
+        SCENE.save(path)
+
+
+def test_what_no_file_can_hold(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"x\.toml: it cannot be written: .*surrogates"):
+        Scene(CAMERA, SCENE.shapes, "\ud800").save(tmp_path / "x.toml")
+    with pytest.raises(SceneError, match="it cannot be written: embedded null"):
+        SCENE.save(tmp_path / "x\0.toml")
 
 
 def test_small_scenes_are_one_text(tmp_path: Path) -> None:

@@ -7,8 +7,11 @@ first; both then use the same LLVM.
 import ctypes
 import importlib
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -16,7 +19,14 @@ from types import ModuleType
 from drpt.kernel import llvm
 from drpt.kernel.llvm import BackendError
 
-__all__ = ["Backend", "BackendError", "describe", "load", "set_thread_count"]
+__all__ = [
+    "Backend",
+    "BackendError",
+    "describe",
+    "interrupts_put_off",
+    "load",
+    "set_thread_count",
+]
 
 VARIABLE = "DRPT_BACKEND"
 """The environment variable that names a backend."""
@@ -79,6 +89,22 @@ def set_thread_count(count: int) -> None:
     dr.set_thread_count(count)
 
 
+@contextmanager
+def interrupts_put_off() -> Iterator[None]:
+    """Let Ctrl-C wait: amidst an import or a loop, Dr.Jit takes it for an error, or crashes."""
+    if threading.current_thread() is not threading.main_thread():  # no other is interrupted
+        yield
+        return
+    interrupts: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if interrupts:
+            signal.raise_signal(signal.SIGINT)
+
+
 def describe() -> Backend:
     """Return what :func:`load` chose, loading the backend if that has not happened yet."""
     name = load().__name__.removeprefix("drjit.")
@@ -111,19 +137,12 @@ def _name_library(*, optional: bool) -> None:
 
 def _import_drjit() -> None:
     try:
-        importlib.import_module("drjit")
+        with interrupts_put_off():
+            importlib.import_module("drjit")
     except (ImportError, NameError) as error:  # the latter: Dr.Jit 1.5 fails to report the former
-        causes = list(_causes(error))
-        if any(isinstance(cause, KeyboardInterrupt) for cause in causes):
-            raise KeyboardInterrupt from None
-        hint = "; it needs libatomic1" if "libatomic" in str(causes[-1]) else ""
-        raise BackendError(f"Dr.Jit cannot be imported ({causes[-1]}){hint}") from error
-
-
-def _causes(error: BaseException | None) -> Iterator[BaseException]:
-    while error:
-        yield error
-        error = error.__cause__ or error.__context__
+        reason = str(error.__context__ or error)
+        hint = "; it needs libatomic1" if "libatomic" in reason else ""
+        raise BackendError(f"Dr.Jit cannot be imported ({reason}){hint}") from error
 
 
 def _works(name: str) -> bool:

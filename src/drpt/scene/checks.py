@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -93,11 +92,29 @@ RADIANCE = Allowed(
 
 def refuse(field: str, value: object, allowed: str) -> SceneError:
     """Return the error that names a value which is not allowed, and what is."""
-    return _refuse_text(field, _show(value), allowed)
+    return _refuse_text(field, show(value), allowed)
+
+
+def items(value: object) -> list[Any]:
+    """Return the items of a list, a tuple or an array; none of anything else."""
+    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
+        return list(value)
+    return []
+
+
+def show(value: object) -> str:
+    """Return `value` as one short line."""
+    item = value.item() if isinstance(value, np.generic) else value
+    try:
+        text = _one_line(repr(item))
+    except ValueError:  # Python refuses to print integers of thousands of digits
+        text = f"this {type(item).__name__}"
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
 
 
 def number(field: str, value: object, allowed: Allowed) -> float:
     """Return `value` as a float, if it is a number in `allowed`."""
+    value = _scalar(value)
     if not _is_real(value) or not allowed.test(value):
         raise refuse(field, value, f"a number {allowed.words}")
     return float(value)
@@ -105,6 +122,7 @@ def number(field: str, value: object, allowed: Allowed) -> float:
 
 def colour(field: str, value: object, allowed: Allowed) -> RGB:
     """Return `value` as red, green and blue in `allowed`; one number stands for grey."""
+    value = _scalar(value)
     channels = (value, value, value) if _is_real(value) else _three(value)
     if channels is None or not all(map(allowed.test, channels)):
         raise refuse(field, value, f"a number {allowed.words}, or three such (red, green, blue)")
@@ -151,14 +169,19 @@ def read_only(array: _Array) -> _Array:
     return array
 
 
+def _scalar(value: object) -> object:
+    """Return the item of an array without dimensions, and anything else as it is."""
+    return value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
+
+
 def _is_real(value: object) -> TypeGuard[float]:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _three(value: object) -> list[float] | None:
     """Return the items of `value` if they are three numbers."""
-    items = list(value) if isinstance(value, Iterable) else []
-    return items if len(items) == 3 and all(map(_is_real, items)) else None
+    channels = items(value)
+    return channels if len(channels) == 3 and all(map(_is_real, channels)) else None
 
 
 def _floats(items: Iterable[float]) -> tuple[float, float, float]:
@@ -179,7 +202,14 @@ def _rows(field: str, value: ArrayLike, kinds: str, words: str) -> NDArray[Any]:
         raise _refuse_text(field, f"an array of shape {array.shape}", f"{allowed}, shape (n, 3)")
     if array.dtype.kind not in kinds:
         raise _refuse_text(field, f"an array of type {array.dtype}", allowed)
+    if array is not value and _has_bool(value):
+        raise _refuse_text(field, "an array with truth values", allowed)
     return array
+
+
+def _has_bool(value: ArrayLike) -> bool:
+    """Whether there is a truth value among numbers, of which NumPy makes a number."""
+    return any(isinstance(item, bool | np.bool_) for item in np.asarray(value, object).flat)
 
 
 def _refuse_first_bad_row(
@@ -197,13 +227,3 @@ def _refuse_text(field: str, text: str, allowed: str) -> SceneError:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _show(value: object) -> str:
-    """Return `value` as one short line."""
-    item = value.item() if isinstance(value, np.generic) else value
-    try:
-        text = _one_line(repr(item))
-    except ValueError:  # Python refuses to print integers of thousands of digits
-        text = f"this {type(item).__name__}"
-    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."

@@ -52,9 +52,9 @@ def _find(name_or_path: str | PathLike[str]) -> Path:
         return path
     if found := builtin_path(name):
         return found
-    if path.exists():
+    if name and os.path.exists(path):  # unlike Path.exists, False where a name is too long
         return path
-    raise _unknown("", "scene", name, builtin_names(), "or the path of a scene file")
+    raise _unknown("", "scene", name, builtin_names(), "the path of a scene file")
 
 
 def _read_toml(path: Path) -> Table:
@@ -126,7 +126,7 @@ def _shape_material(value: object, materials: dict[str, Material]) -> Material:
     if not isinstance(value, str):
         return _material(value)
     if value not in materials:
-        raise _unknown("", "material", value, materials, "or a table with type, albedo, ...")
+        raise _unknown("", "material", value, materials, "a table with type, albedo, ...")
     return materials[value]
 
 
@@ -169,11 +169,15 @@ def _check_keys(table: Table, required: Collection[str], optional: Collection[st
 def _unknown(
     field: str, what: str, value: object, known: Collection[str], otherwise: str = ""
 ) -> SceneError:
-    """Return the error that `value` is not one of the `known`, with the closest of them."""
+    """Return the error that `value` is not one of the `known`, with the closest of them.
+
+    What else is allowed is said by `otherwise`.
+    """
     close = difflib.get_close_matches(str(value), known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
-    allowed = " ".join(filter(None, (f"one of {_list(known)}", otherwise)))
-    return SceneError(f"there is no {what} {value!r}{hint}; it must be {allowed}", field)
+    listed = f"one of {_list(known)}" if known else ""
+    allowed = " or ".join(filter(None, (listed, otherwise)))
+    return SceneError(f"there is no {what} {checks.show(value)}{hint}; it must be {allowed}", field)
 
 
 def _list(names: Collection[str]) -> str:

@@ -320,10 +320,12 @@ def material_from_brdf_params(brdf_params: Vector) -> Material:
 
     The first three are the albedo, from 0 to 1; α is the Phong exponent.
     """
-    if not isinstance(brdf_params, list | tuple | np.ndarray) or len(brdf_params) != 4:
+    items = checks.items(brdf_params)
+    if len(items) != 4:
         words = "four numbers: red, green, blue, exponent"
         raise checks.refuse("brdf_params", brdf_params, words)
-    *albedo, exponent = brdf_params
+    *albedo, alpha = items
+    exponent = checks.number("exponent", alpha, checks.EXPONENT)
     return Diffuse(albedo) if exponent == 1 else Phong(albedo, exponent)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drpt.scene import checks
 from drpt.scene.checks import SceneError
 from drpt.scene.model import Diffuse, Material, Mesh, Scene, Shape
 
@@ -32,6 +33,8 @@ def save_scene(scene: Scene, path: str | PathLike[str]) -> None:
     is replaced as a whole, the scene file last: whatever happens, the file there is complete.
     Raises `SceneError` if it cannot be written.
     """
+    if not isinstance(path, str | os.PathLike) or not Path(path).name:
+        raise checks.refuse("", path, "the path of a scene file")
     path = Path(path)
     folder = path.with_name(f"{path.stem}-meshes")
 
@@ -46,6 +49,8 @@ def save_scene(scene: Scene, path: str | PathLike[str]) -> None:
         _replace(path, _toml(scene, save_mesh).encode())
     except OSError as error:
         raise SceneError(f"it cannot be written: {error.strerror}", source=str(path)) from None
+    except ValueError as error:  # a null character in the path, half a character in a text
+        raise SceneError(f"it cannot be written: {error}", source=str(path)) from None
 
 
 def to_toml(scene: Scene) -> str:
