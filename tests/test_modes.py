@@ -171,9 +171,8 @@ def assert_unchanged(scene: drpt.Scene, reference: Measured, mode: str = "mis") 
     assert_agree(found, reference, UNCHANGED * 1.1)
 
 
-@pytest.mark.parametrize(
-    "split", [pytest.param(1, marks=pytest.mark.slow), 3]
-)  # 8 triangles, and more than the kernel unrolls
+@pytest.mark.slow
+@pytest.mark.parametrize("split", [1, 3])  # 8 triangles, and more than the kernel unrolls
 def test_splitting_a_light_changes_nothing(split: int, reference: Measured) -> None:
     assert_unchanged(small_scene([*reflecting(), *lights(split)]), reference)
 
@@ -228,7 +227,13 @@ def crumbs() -> drpt.Mesh:
     return drpt.Mesh(corners, np.arange(300).reshape(-1, 3), material=drpt.Diffuse(0.6))
 
 
-@pytest.mark.parametrize("extra", [(), (crumbs(),)], ids=["facets", "mesh"])
+@pytest.mark.parametrize(
+    "extra",
+    [
+        pytest.param((), id="facets"),
+        pytest.param((crumbs(),), id="mesh", marks=pytest.mark.slow),
+    ],
+)
 def test_modes_agree_on_lights_flush_with_a_surface(extra: tuple[Shape, ...]) -> None:
     scene = panelled_room(*extra)
     truth = measure_to(UNCHANGED * 0.7, scene, 2, "mis")
@@ -304,7 +309,12 @@ def test_place_and_orientation_do_not_matter(scene: drpt.Scene, reference: Measu
     assert_unchanged(scene, reference)
 
 
-@pytest.mark.parametrize("mode", MODES)
+SLOW_BUT_FOR_MIS = [
+    mode if mode == "mis" else pytest.param(mode, marks=pytest.mark.slow) for mode in MODES
+]
+
+
+@pytest.mark.parametrize("mode", SLOW_BUT_FOR_MIS)
 def test_powers_of_two_change_no_bit(mode: str) -> None:
     picture = drpt.render(small_scene(), 16, 3, mode).image
     for power in (-10, 10):
@@ -312,7 +322,7 @@ def test_powers_of_two_change_no_bit(mode: str) -> None:
         assert np.array_equal(drpt.render(scaled, 16, 3, mode).image, picture)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", SLOW_BUT_FOR_MIS)
 def test_twice_the_radiance_is_twice_the_picture_to_the_bit(mode: str) -> None:
     picture = drpt.render(small_scene(), 16, 3, mode).image
     brighter = drpt.render(with_radiance(small_scene(), 2), 16, 3, mode).image

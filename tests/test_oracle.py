@@ -101,6 +101,7 @@ class TestClosedForms:
         value = closed_forms.sphere_light_flux_through_rectangle(2, radius, height, a, b)
         assert value == pytest.approx(a * b * flux, rel=QUADRATURE)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("exponent", [0, 1, 50, 1e4])
     def test_phong_mirrored_light(self, exponent: float) -> None:
         sigma, theta = 0.4, 0.9
@@ -314,7 +315,9 @@ class TestPathTracer:
         wall = [closed_forms.furnace_radiance(0.8, L, 0.5, 1, bounces) for L in (3, 2, 1)]
         assert_agree(mean[0, 0], se[0, 0], np.array(wall))
 
-    @pytest.mark.parametrize("omega", [0.5, 1.4, 1.6, 2.3])
+    @pytest.mark.parametrize(
+        "omega", [0.5, 1.6, *(pytest.param(angle, marks=pytest.mark.slow) for angle in (1.4, 2.3))]
+    )
     @pytest.mark.parametrize("direct_light", [False, True])
     def test_plane_under_a_sphere_light(self, omega: float, direct_light: bool) -> None:
         sigma, distance = 0.6, 3.0

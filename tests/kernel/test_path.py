@@ -70,7 +70,9 @@ def test_the_comparison_with_the_oracle_sees_a_tenth_more_light(
         assert_agree(measure(with_radiance(scene, 1.1), 2**22, 2, "mis"), truth, DETECTABLE)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(
+    "mode", [m if m == "mis" else pytest.param(m, marks=pytest.mark.slow) for m in MODES]
+)
 @pytest.mark.parametrize("shapes", [(CHALK, LIGHT), (BALL, LIGHT, PANEL), (CHALK, BALL, PANEL)])
 def test_no_sample_of_an_open_scene_is_anything_but_finite(
     shapes: tuple[Shape, ...], mode: str
