@@ -201,10 +201,8 @@ def test_black_and_unlit_shapes_out_of_sight_change_nothing(reference: Measured)
     assert_unchanged(small_scene([*reflecting(), *lights(), *below]), reference)
 
 
-def panelled_room(*extra: Shape) -> drpt.Scene:
-    """A closed room with a panel of light flush with its ceiling, and a panel on its floor."""
-    camera = drpt.Camera((0, 1, -0.9), (0, 1, 0), (0, 1, 0), 60, 32, 32)
-    return drpt.Scene(camera, [*room(), *panels(), *extra])
+TURN = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
+TURN *= np.linalg.det(TURN)  # a rotation, no mirror image
 
 
 def room() -> list[Shape]:
@@ -227,24 +225,94 @@ def crumbs() -> drpt.Mesh:
     return drpt.Mesh(corners, np.arange(300).reshape(-1, 3), material=drpt.Diffuse(0.6))
 
 
+def spheres_in_a_corner() -> list[Shape]:
+    """So many spheres that the kernel loops over them, and one of them in a lamp's place."""
+    place = np.random.default_rng(1).uniform([-0.9, 0.1, -0.9], [-0.7, 0.3, -0.7], (70, 3))
+    lamp = drpt.Sphere((0.4, 0.5, 0.3), 0.2, radiance=3)
+    dull = drpt.Diffuse(0.5)
+    return [*(drpt.Sphere(p, 0.02, dull) for p in place), lamp, replace_surface(lamp, dull)]
+
+
+def replace_surface(sphere: drpt.Sphere, material: drpt.Diffuse) -> drpt.Sphere:
+    return drpt.Sphere(sphere.center, sphere.radius, material)
+
+
+def many_panels() -> list[Shape]:
+    """The panels in more triangles than the kernel unrolls."""
+    return [split_mesh(panel, 3) for panel in panels() if isinstance(panel, drpt.Mesh)]
+
+
+def split_mesh(mesh: drpt.Mesh, times: int) -> drpt.Mesh:
+    triangles = mesh.vertices[mesh.faces]
+    for _ in range(times):
+        triangles = quartered(triangles)
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    return drpt.Mesh(triangles.reshape(-1, 3), faces, radiance=mesh.radiance)
+
+
+def two_sided_lamp() -> list[Shape]:
+    corners = np.array([[-0.3, 0.8, 0.2], [0.3, 0.8, 0.2], [0.3, 1.2, 0.4], [-0.3, 1.2, 0.4]])
+    quad = np.array([[0, 1, 2], [0, 2, 3]])
+    return [drpt.Mesh(corners, faces, radiance=4) for faces in (quad, quad[:, ::-1])]
+
+
+def overlapping_panels() -> list[Shape]:
+    small = panels()
+    corners = np.array([[-0.5, 2, -0.1], [0.5, 2, -0.1], [0.5, 2, 0.2], [-0.5, 2, 0.2]])
+    return [*small, drpt.Mesh(corners, [[0, 1, 2], [0, 2, 3]], radiance=3)]
+
+
+COINCIDENCES: dict[str, list[Shape]] = {
+    "panels flush with facets": panels(),
+    "panels flush with a mesh": [*panels(), crumbs()],
+    "many panels flush with facets": many_panels(),
+    "many panels flush with a mesh": [*many_panels(), crumbs()],
+    "lamp of two sides": two_sided_lamp(),
+    "lamp of two sides, turned": two_sided_lamp()[::-1],
+    "panels that overlap": overlapping_panels(),
+    "panels that overlap, turned": overlapping_panels()[::-1],
+    "a lamp in a sphere's place, among many": spheres_in_a_corner(),
+}
+
+
+def tilted(shapes: list[Shape]) -> list[Shape]:
+    """Turned off the axes and far from the origin, where nothing rounds to the same."""
+
+    def place(points: object) -> Floats:
+        return np.asarray(np.asarray(points) @ TURN.T + [30, 7, -11])
+
+    return [
+        replace(s, center=tuple(place(s.center)))
+        if isinstance(s, drpt.Sphere)
+        else replace(s, vertices=place(s.vertices))
+        for s in shapes
+    ]
+
+
 @pytest.mark.parametrize(
-    "extra",
-    [
-        pytest.param((), id="facets"),
-        pytest.param((crumbs(),), id="mesh", marks=pytest.mark.slow),
-    ],
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow if i else ()) for i, n in enumerate(COINCIDENCES)],
 )
-def test_modes_agree_on_lights_flush_with_a_surface(extra: tuple[Shape, ...]) -> None:
-    scene = panelled_room(*extra)
+def test_modes_agree_on_lights_that_coincide_with_something(name: str) -> None:
+    eye, target = TURN @ [0, 1, -0.9] + [30, 7, -11], TURN @ [0, 1, 0] + [30, 7, -11]
+    camera = drpt.Camera(eye, target, TURN @ [0, 1, 0], 60, 32, 32)
+    scene = drpt.Scene(camera, tilted([*room(), *COINCIDENCES[name]]))
     truth = measure_to(UNCHANGED * 0.7, scene, 2, "mis")
     for mode in ("implicit", "explicit"):
         assert_agree(measure_to(UNCHANGED * 0.7, scene, 2, mode, seed=5), truth, UNCHANGED * 1.1)
 
 
+@pytest.mark.parametrize("lamp", [two_sided_lamp(), two_sided_lamp()[::-1]])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_lamp_of_two_sides_shines_on_both(lamp: list[Shape], side: int) -> None:
+    camera = drpt.Camera((0, 1, 0.3 + 3 * side), (0, 1, 0.3), (0, 1, 0), 2, 8, 8)
+    assert (drpt.render(drpt.Scene(camera, lamp), 1, 0).image == 4).all()
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_coincident_lights_are_one_of_their_sum(mode: str) -> None:
     lamp, whole = (drpt.Sphere((0, 1.5, 0.2), 0.2, radiance=r) for r in (5, 10))
-    camera = panelled_room().camera
+    camera = drpt.Camera((0, 1, -0.9), (0, 1, 0), (0, 1, 0), 60, 32, 32)
     halves = drpt.Scene(camera, [*room(), *panels(2), lamp, *panels(3), lamp])
     once = drpt.Scene(camera, [*room(), *panels(5), whole])
     pictures = [drpt.render(scene, 16, 2, mode).image for scene in (halves, once)]
@@ -291,10 +359,6 @@ def transformed(turn: Floats, scale: float = 1.0, shift: Floats | None = None) -
     eye, target, up = place(camera.eye), place(camera.target), turn @ camera.up
     moved = drpt.Camera(eye, target, up, camera.fov, camera.width, camera.height)
     return drpt.Scene(camera=moved, shapes=shapes)
-
-
-TURN = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
-TURN *= np.linalg.det(TURN)  # a rotation, no mirror image
 
 
 @pytest.mark.parametrize(

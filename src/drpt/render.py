@@ -70,7 +70,7 @@ class Result:
     scene, spp, bounces, mode, sampler, seed, jitter
         What was rendered, and how; ``spp`` are the samples that each pixel has got.
     seconds
-        Time from the start, compilation included.
+        Time that the passes took, compilation included.
     rays
         Rays traced, to vertices and to lights.
     non_finite
@@ -142,14 +142,15 @@ class Rendering:
         self.seed = _check_whole("seed", seed, 0, None)
         self.jitter = _check_switch("jitter", jitter)
         self._film = Film(scene.camera.width * scene.camera.height)
-        self._done = 0
+        self._done = 0  # samples of each pixel, in whole passes
+        self._pixels = 0  # that have got those of the pass amid which an interrupt came
         self._rays = 0
         self._non_finite = 0
         self._seconds = 0.0
 
     def passes(self) -> Iterator[int]:
         """Run the passes that have not run yet; yields after each the samples per pixel so far."""
-        start = perf_counter() - self._seconds
+        start = perf_counter()
         with backend.interrupts_put_off():
             launcher = self.launcher()
         pixels = len(self._film.mean)
@@ -157,15 +158,19 @@ class Rendering:
             if samples.start < self._done:
                 continue
             for part in _parts(pixels):
+                if part.start < self._pixels:
+                    continue
                 replicates = min(len(samples), max(1, LAUNCH_LANES // len(part)))
                 with backend.interrupts_put_off():
                     sums = launcher.launch(part, samples, replicates, self.seed)
                 self._film.add(part, sums.radiance, len(samples))
                 self._rays += sums.rays
                 self._non_finite += sums.non_finite
-            self._done = samples.stop
-            self._seconds = perf_counter() - start
+                self._pixels = part.stop
+            self._done, self._pixels = samples.stop, 0
+            self._seconds += perf_counter() - start
             yield self._done
+            start = perf_counter()
 
     def launcher(self) -> Launcher:
         """Put the scene on the device."""
@@ -177,7 +182,10 @@ class Rendering:
         )
 
     def result(self) -> Result:
-        """The picture of the passes that have run."""
+        """The picture of the passes that have run.
+
+        After an interrupt amid a pass, some pixels hold its samples already.
+        """
         camera = self.scene.camera
         return Result(
             image=self._film.mean.astype(np.float32).reshape(camera.height, camera.width, 3),
@@ -211,10 +219,10 @@ def render(
     scene
         What to render.
     spp
-        Samples per pixel, at least 1.
+        Samples per pixel, from 1 to 2⁴⁸.
     bounces
-        How often light bounces at most: 0 shows the lights alone, 1 adds what they light, 2 one
-        indirect bounce, …. Light of longer paths is missing from the picture.
+        How often light bounces at most, from 0 to 65536: 0 shows the lights alone, 1 adds what
+        they light, 2 one indirect bounce, …. Light of longer paths is missing from the picture.
     mode
         A `Mode` or its name; all of them converge to the same picture.
     sampler

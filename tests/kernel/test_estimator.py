@@ -85,12 +85,26 @@ def test_a_scene_of_everything_has_all_features() -> None:
 
 def test_spheres_alone() -> None:
     found = features(BALL, LAMP)
-    assert found == {"spheres", "diffuse", "emission", "direct_light", "sphere_lights", "mis"}
+    assert found == {
+        "spheres",
+        "diffuse",
+        "emission",
+        "direct_light",
+        "sphere_light_samples",
+        "mis",
+    }
 
 
 def test_triangles_alone() -> None:
     found = features(TRIANGLE, PANEL)
-    assert found == {"triangles", "diffuse", "emission", "direct_light", "triangle_lights", "mis"}
+    assert found == {
+        "triangles",
+        "diffuse",
+        "emission",
+        "direct_light",
+        "triangle_light_samples",
+        "mis",
+    }
 
 
 def test_each_feature_needs_its_cause() -> None:
@@ -117,7 +131,7 @@ def test_without_bounces_or_surfaces_only_emission_is_left(mode: str) -> None:
 
 @pytest.mark.parametrize("mode", ["implicit", "implicit-uniform"])
 def test_implicit_modes_sample_no_light(mode: str) -> None:
-    assert not features(BALL, LAMP, mode=mode) & {"direct_light", "sphere_lights", "mis"}
+    assert not features(BALL, LAMP, mode=mode) & {"direct_light", "sphere_light_samples", "mis"}
 
 
 def test_only_mis_weighs() -> None:

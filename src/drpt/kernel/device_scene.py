@@ -36,10 +36,12 @@ class DeviceScene:
     Attributes
     ----------
     facets, blockers
-        Constants of each facet, and whether it can cast a shadow.
+        Constants of each facet that reflects, and whether it can cast a shadow.
     mesh, reach
-        The triangles that are too many for facets, and the largest coordinate of each one that
-        reflects.
+        The triangles that reflect, and the largest coordinate of each, where they are too many
+        for facets.
+    light_facets, light_mesh
+        The same for those that emit.
     balls
         Each sphere, where they are few.
     geometry
@@ -57,7 +59,6 @@ class DeviceScene:
     """
 
     types: ModuleType
-    first_facet: int
     first_smooth: int
     first_sphere: int
     first_light: int
@@ -66,6 +67,8 @@ class DeviceScene:
     blockers: tuple[bool, ...]
     mesh: TriangleMesh | None
     reach: Float | None
+    light_facets: tuple[Facet, ...]
+    light_mesh: TriangleMesh | None
     balls: tuple[Ball, ...]
     geometry: Float
     reflectance: Float
@@ -96,12 +99,12 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     cdf = primitives.light_cdf()
     pmf = np.diff(cdf, prepend=0)
     triangles = primitives.triangles
+    in_light_mesh = primitives.light_corners[len(primitives.light_facets) :]
     few_spheres = len(primitives.spheres) <= UNROLL_LIMIT
     first = primitives.first_sphere
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
     return DeviceScene(
         types=types,
-        first_facet=len(triangles),
         first_smooth=primitives.first_smooth,
         first_sphere=first,
         first_light=primitives.first_light,
@@ -109,7 +112,9 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         facets=primitives.facets,
         blockers=tuple(primitives.blockers()),
         mesh=TriangleMesh(triangles, types) if len(triangles) else None,
-        reach=array(np.abs(triangles[:first]).max(axis=(1, 2))) if len(triangles) else None,
+        reach=array(np.abs(triangles).max(axis=(1, 2))) if len(triangles) else None,
+        light_facets=primitives.light_facets,
+        light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
         geometry=array(np.concatenate([planes, primitives.spheres, lit_planes])),
         reflectance=array(primitives.reflectance),

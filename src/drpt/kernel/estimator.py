@@ -52,7 +52,23 @@ class Mode(StrEnum):
 
 @dataclass(frozen=True)
 class Features:
-    """What a kernel contains; what is False here leaves no instruction in it."""
+    """What a kernel contains; what is False here leaves no instruction in it.
+
+    Attributes
+    ----------
+    spheres, triangles, interpolated_normals
+        Intersections with them, and the normals that they have.
+    diffuse, phong
+        Reflection of that kind.
+    emission
+        Radiance of lights that paths run into; in the explicit modes camera rays alone do.
+    direct_light, light_choice
+        Samples of lights at every vertex, and the choice among several.
+    sphere_light_samples, triangle_light_samples
+        Samples of lights of that kind.
+    mis
+        Weights for both ways to find a light.
+    """
 
     spheres: bool
     triangles: bool
@@ -62,8 +78,8 @@ class Features:
     emission: bool
     direct_light: bool
     light_choice: bool
-    sphere_lights: bool
-    triangle_lights: bool
+    sphere_light_samples: bool
+    triangle_light_samples: bool
     mis: bool
 
     @classmethod
@@ -81,7 +97,7 @@ class Features:
             emission=emission,
             direct_light=direct_light,
             light_choice=direct_light and len(primitives.radiance) > 1,
-            sphere_lights=direct_light and primitives.sphere_lights > 0,
-            triangle_lights=direct_light and len(primitives.light_corners) > 0,
+            sphere_light_samples=direct_light and primitives.sphere_lights > 0,
+            triangle_light_samples=direct_light and len(primitives.light_corners) > 0,
             mis=direct_light and mode.counts_hits,
         )

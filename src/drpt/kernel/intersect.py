@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
     from drpt.kernel.facets import Facet
-    from drpt.kernel.mesh import TriangleMesh
 
 SPAWN_OFFSET = 2.0**-20
 """How far off its surface a ray starts, relative to the coordinates there: 16 half ulps.
@@ -27,10 +26,11 @@ A hit point that was projected back onto its surface, and the test against the s
 together off by about ten half ulps at the most (Wächter & Binder 2019, Ray Tracing Gems, ch. 6).
 For a triangle of a mesh, whose test starts from its corners, those are coordinates, too.
 """
-COINCIDENT = 1 - 2.0**-20
-"""Ratio of two distances, rounded alike, that may be the same.
+COINCIDENT = 2.0**-20
+"""Up to which difference surfaces are one, relative to the coordinates and the distance to them.
 
-A light lies on top of a surface that it coincides with, and no surface there shades it.
+What shows the front of a light there shows the light: a lamp flush with a wall is seen, and not
+shaded by it. The back of a light hides nothing. Of two such lights the later one counts.
 """
 
 
@@ -54,59 +54,60 @@ class Hit(NamedTuple):
 def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
     """The first surface that a ray meets."""
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
-    for number, met, t in _candidates(scene, ray, active):
-        is_light = isinstance(number, int) and number >= scene.first_light
-        closer = met & (COINCIDENT * t < nearest if is_light else t < nearest)
+    for number, met, t in _surfaces_and_spheres(scene, ray, active):
+        closer = met & (t <= nearest)
+        nearest = dr.select(closer, t, nearest)
+        primitive = dr.select(closer, number, primitive)
+    for number, met, t, front in _light_triangles(scene, ray, active):
+        slack = _slack(ray, t)
+        closer = met & (t + dr.select(front, -slack, slack) < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
     return _surface(scene, features, ray, nearest, primitive, active & (nearest < dr.inf))
 
 
 def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, active: Bool) -> Bool:
-    """Whether anything but the light itself stands on the first ``distance`` of a ray."""
+    """Whether a ray meets anything before the light at this ``distance``, or on top of it."""
+    target = scene.first_light + light
+    slack = _slack(ray, distance)
+    before, beyond = distance - slack, distance + slack
     blocked = scene.types.Bool(False)
-    for _, met, t in _candidates(scene, ray, active, skip=scene.first_light + light):
-        blocked |= met & (t < COINCIDENT * distance)
+    for number, met, t in _surfaces_and_spheres(scene, ray, active, target):
+        is_surface = isinstance(number, int) and number < scene.first_light
+        blocked |= met & (
+            t < (before if is_surface else dr.select(number > target, beyond, before))
+        )
+    for number, met, t, front in _light_triangles(scene, ray, active, target):
+        blocked |= met & (t < dr.select(front & (number > target), beyond, before))
     return blocked
 
 
-def _candidates(
-    scene: DeviceScene, ray: Ray, active: Bool, skip: UInt32 | None = None
+def _slack(ray: Ray, t: Float) -> Float:
+    return COINCIDENT * (t + _largest(ray.origin))
+
+
+def _surfaces_and_spheres(
+    scene: DeviceScene, ray: Ray, active: Bool, target: UInt32 | None = None
 ) -> Iterator[tuple[Any, Bool, Float]]:
     """What a ray may meet first: a primitive's number, whether it is met beyond 0, and where.
 
-    For shadow rays, ``skip`` is the number of the light that they lead to, which casts none.
+    For shadow rays, ``target`` is the number of the light that they lead to, which casts none.
     """
     if scene.mesh is not None:
-        yield _closest_of_mesh(scene, scene.mesh, ray, active, skip)
-    for index, (facet, blocks) in enumerate(
-        zip(scene.facets, scene.blockers, strict=True), start=scene.first_facet
-    ):
-        number = index if index < scene.first_sphere else index + scene.sphere_count
-        if blocks or skip is None:
-            met, t = _meet_facet(ray, facet)
-            yield number, met & _counts(scene, number, skip), t
+        yield scene.mesh.closest(ray, active)
+    for number, (facet, blocks) in enumerate(zip(scene.facets, scene.blockers, strict=True)):
+        if blocks or target is None:
+            yield number, *_meet_facet(ray, facet)
     for number, ball in enumerate(scene.balls, start=scene.first_sphere):
         met, t = _meet_sphere(ray, ball)
-        yield number, met & _counts(scene, number, skip), t
+        is_light = number >= scene.first_light
+        yield number, met & (target != number) if is_light and target is not None else met, t
     if scene.sphere_count > len(scene.balls):
-        yield _closest_of_spheres(scene, ray, active, skip)
-
-
-def _counts(scene: DeviceScene, number: int, skip: UInt32 | None) -> Bool | bool:
-    return True if skip is None or number < scene.first_light else skip != number
-
-
-def _closest_of_mesh(
-    scene: DeviceScene, mesh: TriangleMesh, ray: Ray, active: Bool, skip: UInt32 | None
-) -> tuple[UInt32, Bool, Float]:
-    index, met, t = mesh.closest(ray, active)
-    number = index + dr.select(index < scene.first_sphere, 0, scene.sphere_count)
-    return number, met if skip is None else met & (number != skip), t
+        yield _closest_of_spheres(scene, ray, active, target)
 
 
 def _closest_of_spheres(
-    scene: DeviceScene, ray: Ray, active: Bool, skip: UInt32 | None
+    scene: DeviceScene, ray: Ray, active: Bool, target: UInt32 | None
 ) -> tuple[UInt32, Bool, Float]:
     """The first of many spheres, by a loop over them."""
     types = scene.types
@@ -114,13 +115,30 @@ def _closest_of_spheres(
     def step(number: UInt32, nearest: Float, found: UInt32) -> tuple[UInt32, Float, UInt32]:
         row = scene.geometry_row(number)
         met, t = _meet_sphere(ray, Ball(vec3(row[0], row[1], row[2]), row[3]))
-        closer = met & (t < nearest) & (True if skip is None else number != skip)
+        closer = met & (t <= nearest) & (True if target is None else number != target)
         return number + 1, dr.select(closer, t, nearest), dr.select(closer, number, found)
 
     end = scene.first_sphere + scene.sphere_count
     state = (types.UInt32(scene.first_sphere), types.Float32(dr.inf), types.UInt32(0))
     _, t, number = dr.while_loop(state, lambda i, *_: active & (i < end), step)
     return number, t < dr.inf, t
+
+
+def _light_triangles(
+    scene: DeviceScene, ray: Ray, active: Bool, target: UInt32 | None = None
+) -> Iterator[tuple[Any, Bool, Float, Bool]]:
+    """The same of the triangles that emit, and whether a ray meets their front."""
+    first = scene.first_light + scene.sphere_lights
+    for number, facet in enumerate(scene.light_facets, start=first):
+        met, t = _meet_facet(ray, facet)
+        front = _dot(facet.normal, ray.direction) < 0
+        yield number, met if target is None else met & (target != number), t, front
+    if scene.light_mesh is not None:
+        index, met, t = scene.light_mesh.closest(ray, active)
+        found = first + index
+        row = scene.geometry_row(found, met)
+        front = dr.dot(vec3(row[0], row[1], row[2]), ray.direction) < 0
+        yield found, met if target is None else met & (target != found), t, front
 
 
 def _meet_facet(ray: Ray, facet: Facet) -> tuple[Bool, Float]:

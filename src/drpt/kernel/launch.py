@@ -57,14 +57,14 @@ class Launcher:
         the arguments are inputs of one and the same kernel.
         """
         index = self.tracer.scene.types.UInt32
-        seed_word = np.random.SeedSequence(seed).generate_state(1)[0] + (samples.start >> 32)
+        seed_word = int(np.random.SeedSequence(seed).generate_state(1)[0]) + (samples.start >> 32)
         inputs = (
             pixels.start,
             len(pixels),
             samples.start & 0xFFFFFFFF,
             len(samples),
             replicates,
-            int(seed_word) & 0xFFFFFFFF,
+            seed_word & 0xFFFFFFFF,
         )
         lane = dr.arange(index, len(pixels) * replicates)
         radiance, rays, non_finite = self._trace(lane, *(dr.opaque(index, i) for i in inputs))
@@ -124,7 +124,7 @@ def make_launcher(
 ) -> Launcher:
     """Put a scene on the device of the backend ``types``, for kernels with what it needs."""
     primitives = make_primitives(scene)
-    if len(primitives.triangles):
+    if len(primitives.triangles) or len(primitives.light_corners) > len(primitives.light_facets):
         types = import_module(f"{types.__name__}.ad")  # Mitsuba's, for its meshes
     features = Features.of(primitives, bounces, mode)
     if not (features.diffuse or features.phong):

@@ -84,9 +84,9 @@ def _by_kind(
     triangle: Callable[[], Any],
 ) -> Any:
     """What the light's kind asks for; the kernel has no code for a kind that is missing."""
-    if not features.triangle_lights:
+    if not features.triangle_light_samples:
         return sphere()
-    if not features.sphere_lights:
+    if not features.sphere_light_samples:
         return triangle()
     return dr.select(light < scene.sphere_lights, sphere(), triangle())
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Array: TypeAlias = NDArray[np.float64]
 
 UNROLL_LIMIT = 64
-"""Up to so many facets, and so many spheres, are tested one by one in the kernel's own code."""
+"""Up to so many facets, emitting facets and spheres are tested one by one in the kernel."""
 MERGE_LIMIT = 4 * UNROLL_LIMIT
 """Meshes of more triangles than this are not searched for coplanar neighbours."""
 DIFFUSE = -1.0
@@ -44,10 +44,10 @@ class Primitives:
         The point (3,) that everything else is relative to; 0 unless the scene is far from it.
     planes
         Row (normal, offset) of each triangle or polygon.
-    triangles
-        Where they are many, the corners (n, 3, 3) of the first n of them, for a mesh; else none.
-    facets
-        The others.
+    facets, triangles
+        Those that reflect: where they are few, as facets; else as the corners (n, 3, 3) of a mesh.
+    light_facets
+        Those that emit, where they are few.
     smooth_corners, smooth_normals
         Corners and their normals (n, 3, 3) of the triangles with interpolated normals.
     light_corners
@@ -64,8 +64,9 @@ class Primitives:
 
     origin: Array
     planes: Array
-    triangles: Array
     facets: tuple[Facet, ...]
+    triangles: Array
+    light_facets: tuple[Facet, ...]
     smooth_corners: Array
     smooth_normals: Array
     light_corners: Array
@@ -114,9 +115,8 @@ class Primitives:
 
     def blockers(self) -> list[bool]:
         """Whether each facet can stand between two points of the scene."""
-        if len(self.triangles):
-            return [True] * len(self.facets)
-        points = np.concatenate([*(f.corners for f in self.facets), self.spheres[:, :3]])
+        outlines = [facet.corners for facet in self.facets]
+        points = np.concatenate([*outlines, *self.light_corners, self.spheres[:, :3]])
         radii = np.zeros(len(points))
         radii[len(points) - len(self.spheres) :] = self.spheres[:, 3]
         return [not bounds(facet, points, radii) for facet in self.facets]
@@ -136,13 +136,15 @@ def make_primitives(scene: Scene) -> Primitives:
     light_spheres, sphere_radiance = _lights(
         [_Part(s, _row(s, origin)) for s in spheres if s.is_light], 4
     )
-    flat, facets = _unrolled(flat, smooth, light_corners)
-    corners = np.concatenate([*map(_triangles, (*flat, *smooth)), light_corners])
+    flat, facets = _unrolled(flat, smooth)
+    corners = np.concatenate([np.empty((0, 3, 3)), *map(_triangles, (*flat, *smooth))])
+    few_lights = len(light_corners) <= UNROLL_LIMIT
     return Primitives(
         origin=origin,
-        planes=_planes(corners),
-        triangles=corners[: len(corners) - len(facets)],
+        planes=_planes(np.concatenate([corners, light_corners])),
         facets=facets,
+        triangles=corners[len(facets) :],
+        light_facets=tuple(map(make_facet, light_corners)) if few_lights else (),
         smooth_corners=_joined(smooth, 3, 3),
         smooth_normals=np.concatenate([np.empty((0, 3, 3)), *(part.normals for part in smooth)]),
         light_corners=light_corners,
@@ -173,21 +175,15 @@ def _part(mesh: Mesh, origin: Array) -> _Part:
     return _Part(mesh, corners[kept], mesh.normals[mesh.faces[kept]])
 
 
-def _unrolled(
-    flat: list[_Part], smooth: list[_Part], lights: Array
-) -> tuple[list[_Part], tuple[Facet, ...]]:
-    """The flat parts, coplanar triangles merged, and facets of all, where those are few.
-
-    Else the facets are of the lights alone, or none, where those are many, too.
-    """
-    emitting = tuple(map(make_facet, lights)) if len(lights) <= UNROLL_LIMIT else ()
-    if sum(len(part.primitives) for part in (*flat, *smooth)) + len(lights) > MERGE_LIMIT:
-        return flat, emitting
+def _unrolled(flat: list[_Part], smooth: list[_Part]) -> tuple[list[_Part], tuple[Facet, ...]]:
+    """The flat parts, coplanar triangles merged, and all facets, if those are few enough."""
+    if sum(len(part.primitives) for part in (*flat, *smooth)) > MERGE_LIMIT:
+        return flat, ()
     merged = [part._replace(primitives=merge_coplanar(part.primitives)) for part in flat]
     polygons = [polygon for part in (*merged, *smooth) for polygon in part.primitives]
-    if len(polygons) + len(lights) > UNROLL_LIMIT:
-        return flat, emitting
-    return merged, (*map(make_facet, polygons), *emitting)
+    if len(polygons) > UNROLL_LIMIT:
+        return flat, ()
+    return merged, tuple(map(make_facet, polygons))
 
 
 def _lights(parts: list[_Part], *shape: int) -> tuple[Array, Array]:
