@@ -261,6 +261,29 @@ def test_parts_of_a_pass_make_the_same_picture(monkeypatch: pytest.MonkeyPatch) 
     assert parts.rays == whole.rays
 
 
+def test_a_render_goes_on_after_an_interrupt_amid_a_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    from drpt.kernel.launch import Launcher
+
+    monkeypatch.setattr(MODULE, "LAUNCH_PIXELS", 17)
+    whole = drpt.render(SCENE, 4, 2)
+    launch, launched = Launcher.launch, []
+
+    def interrupted(self: Launcher, *arguments: Any) -> Any:
+        launched.append(arguments)
+        if len(launched) == 3:
+            raise KeyboardInterrupt
+        return launch(self, *arguments)
+
+    monkeypatch.setattr(Launcher, "launch", interrupted)
+    rendering = drpt.Rendering(SCENE, 4, 2)
+    with pytest.raises(KeyboardInterrupt):
+        list(rendering.passes())
+    assert list(rendering.passes()) == [4]
+    resumed = rendering.result()
+    assert np.array_equal(resumed.image, whole.image)
+    assert resumed.rays == whole.rays
+
+
 def test_injected_infinities_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     from drpt.kernel.path import Tracer
 

@@ -73,10 +73,9 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
     before, beyond = distance - slack, distance + slack
     blocked = scene.types.Bool(False)
     for number, met, t in _surfaces_and_spheres(scene, ray, active, target):
-        is_surface = isinstance(number, int) and number < scene.first_light
-        blocked |= met & (
-            t < (before if is_surface else dr.select(number > target, beyond, before))
-        )
+        reflects = isinstance(number, int) and number < scene.first_light
+        reach = before if reflects else dr.select(number > target, beyond, before)
+        blocked |= met & (t < reach)
     for number, met, t, front in _light_triangles(scene, ray, active, target):
         blocked |= met & (t < dr.select(front & (number > target), beyond, before))
     return blocked
