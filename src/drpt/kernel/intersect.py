@@ -72,6 +72,8 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
     slack = _slack(ray, distance)
     before, beyond = distance - slack, distance + slack
     blocked = scene.types.Bool(False)
+    if scene.mesh is not None:
+        blocked = scene.mesh.blocks(ray, before, active)
     for number, met, t in _surfaces_and_spheres(scene, ray, active, target):
         reflects = isinstance(number, int) and number < scene.first_light
         reach = before if reflects else dr.select(number > target, beyond, before)
@@ -90,9 +92,10 @@ def _surfaces_and_spheres(
 ) -> Iterator[tuple[Any, Bool, Float]]:
     """What a ray may meet first: a primitive's number, whether it is met beyond 0, and where.
 
-    For shadow rays, ``target`` is the number of the light that they lead to, which casts none.
+    For shadow rays, ``target`` is the number of the light that they lead to, which casts none; a
+    mesh is asked about those as a whole.
     """
-    if scene.mesh is not None:
+    if scene.mesh is not None and target is None:
         yield scene.mesh.closest(ray, active)
     for number, (facet, blocks) in enumerate(zip(scene.facets, scene.blockers, strict=True)):
         if blocks or target is None:

@@ -48,6 +48,12 @@ class TriangleMesh:
         )
         return hit.prim_index, hit.is_valid(), hit.t
 
+    def blocks(self, ray: Ray, distance: Float, active: Bool) -> Bool:
+        """Whether any triangle stands on the first ``distance`` of a ray."""
+        segment = self._ray(ray.origin, ray.direction)
+        segment.maxt = distance
+        return self._scene.ray_test(segment, active=active)
+
 
 @contextmanager
 def _mitsuba(types: ModuleType) -> Iterator[Any]:
