@@ -1,22 +1,14 @@
 """Loads the backend before test modules import kernels; moves arrays to the device and back."""
 
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pytest
 
 from drpt.kernel import backend
 from tests.oracle.arrays import Floats
 
 TYPES = backend.load()
-
-
-@pytest.fixture(scope="session")
-def types() -> ModuleType:
-    """Dr.Jit's module of array types, ``drjit.llvm`` or ``drjit.cuda``."""
-    return TYPES
 
 
 def to_device(values: npt.ArrayLike) -> Any:
