@@ -2,7 +2,7 @@
 BIN := .venv/bin
 STAMP := .venv/.stamp
 
-.PHONY: demo test test-quick lint format lock clean
+.PHONY: demo test test-quick lint format references lock clean
 
 demo: $(STAMP)  ## render the Cornell box
 	@mkdir -p out
@@ -23,6 +23,9 @@ lint: $(STAMP)  ## what CI checks before the tests
 format: $(STAMP)  ## let ruff write the code's format
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+references: $(STAMP)  ## make Mitsuba's pictures in reference/ again, a quarter of an hour
+	$(BIN)/python -m reference.make
 
 lock:  ## take the newest versions that pyproject.toml allows
 	@tools/lock.sh

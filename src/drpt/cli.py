@@ -17,6 +17,17 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import drpt
 from drpt import doctor
+from drpt.crosscheck.check import (
+    MITSUBA,
+    SPP,
+    Reference,
+    Verdict,
+    check,
+    render_reference,
+    stored_reference,
+)
+from drpt.crosscheck.estimate import PASSES, check_spp
+from drpt.crosscheck.maps import save_maps
 from drpt.kernel import backend
 from drpt.output import SUFFIXES, check_target
 from drpt.render import SAMPLERS, Mode, Rendering
@@ -24,7 +35,7 @@ from drpt.scene import Scene, load_scene
 from drpt.scene.builtin import builtin_descriptions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from drpt.render import Result
 
@@ -34,6 +45,8 @@ FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
 
+ALL = "all"
+"""All modes, in place of one."""
 MAX_THREADS = 1024
 """More than the cores of a machine; the system refuses to start very many more."""
 
@@ -124,7 +137,14 @@ exit status: 0; 1 if the run failed; 2 for bad input; 130 after Ctrl-C""",
     _add_scene(parser)
     _add_pictures(parser.add_argument_group("pictures"))
     _add_transport(parser.add_argument_group("light"))
-    _add_sampling(parser.add_argument_group("samples"))
+    samples = parser.add_argument_group("samples")
+    _add_sampling(samples)
+    samples.add_argument(
+        "--no-jitter",
+        dest="jitter",
+        action="store_false",
+        help="send every camera ray through the centre of its pixel",
+    )
     run = parser.add_argument_group("run")
     run.add_argument(
         "--threads", metavar="N", type=_thread_count, help="CPU threads (default: one per core)"
@@ -150,8 +170,7 @@ def _add_pictures(group: argparse._ArgumentGroup) -> None:
         help=f"a picture to write ({', '.join(SUFFIXES)}); may be repeated "
         "(default: SCENE.exr in the current folder)",
     )
-    group.add_argument("--width", metavar="N", type=_integer, help="pixels (default: the scene's)")
-    group.add_argument("--height", metavar="N", type=_integer, help="pixels (default: the scene's)")
+    _add_size(group)
     group.add_argument(
         "--exposure",
         metavar="STOPS",
@@ -161,29 +180,34 @@ def _add_pictures(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def _add_transport(group: argparse._ArgumentGroup) -> None:
+def _add_size(group: argparse._ActionsContainer) -> None:
+    group.add_argument("--width", metavar="N", type=_integer, help="pixels (default: the scene's)")
+    group.add_argument("--height", metavar="N", type=_integer, help="pixels (default: the scene's)")
+
+
+def _add_transport(group: argparse._ActionsContainer, modes: Sequence[str] = tuple(Mode)) -> None:
     group.add_argument(
         "--bounces",
         metavar="N",
         type=_integer,
         default=3,
         help="how often light bounces at most: 0 shows the lights, 1 adds what they light, "
-        "2 one indirect bounce, ... (default: %(default)s)",
+        "2 one indirect bounce, ... (default: 3)",
     )
     group.add_argument(
         "--mode",
         metavar="M",
         default="mis",
-        help=f"how light is found: {', '.join(Mode)} (default: %(default)s)",
+        help=f"how light is found: {', '.join(modes)} (default: %(default)s)",
     )
 
 
-def _add_sampling(group: argparse._ArgumentGroup) -> None:
+def _add_sampling(group: argparse._ActionsContainer, spp: int = 64) -> None:
     group.add_argument(
         "--spp",
         metavar="N",
         type=_integer,
-        default=64,
+        default=spp,
         help="samples per pixel; more give less noise (default: %(default)s)",
     )
     group.add_argument(
@@ -199,12 +223,44 @@ def _add_sampling(group: argparse._ArgumentGroup) -> None:
         default=0,
         help="another number gives other noise (default: %(default)s)",
     )
-    group.add_argument(
-        "--no-jitter",
-        dest="jitter",
-        action="store_false",
-        help="send every camera ray through the centre of its pixel",
+
+
+def _add_check(commands: _Commands) -> None:
+    parser = commands.add_parser(
+        "check",
+        help="hold pictures against Mitsuba 3",
+        description="""Render a scene with drpt and with Mitsuba 3, or take a reference from a file,
+and test whether both pictures have the same expectation: the mean of the image,
+and blocks of pixels of all sizes. Each of the two tests fails by chance once in
+1000 times.""",
+        epilog="""examples:
+  drpt check cornell-box
+  drpt check veach --mode all --bounces 2
+  drpt check my.toml --width 128 --height 128 --spp 4096 -o maps
+  drpt check cornell-box --mode implicit --against reference/cornell-box-3.exr
+
+exit status: 0; 1 if a picture differs or the run failed; 2 for bad input; 130 after Ctrl-C""",
     )
+    _add_scene(parser)
+    parser.add_argument(
+        "--against",
+        metavar="REF",
+        default=MITSUBA.lower(),
+        help="mitsuba, or an .exr of the same view; its layer 'variance' tells its noise "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FOLDER",
+        type=Path,
+        help="write image, reference, error and p-values there as pictures "
+        "(default: only those that differ, to SCENE-check)",
+    )
+    _add_size(parser)
+    _add_transport(parser.add_argument_group("light"), modes=(*Mode, ALL))
+    _add_sampling(parser.add_argument_group("samples"), spp=SPP)
+    parser.set_defaults(parser=parser, run=_check, bounces=None)
 
 
 def _add_scenes(commands: _Commands) -> None:
@@ -238,7 +294,7 @@ def _add_doctor(commands: _Commands) -> None:
     parser.set_defaults(parser=parser, run=_doctor)
 
 
-_COMMANDS = (_add_render, _add_scenes, _add_explain, _add_doctor)
+_COMMANDS = (_add_render, _add_check, _add_scenes, _add_explain, _add_doctor)
 
 
 def _add_version(parser: _Parser) -> None:
@@ -290,6 +346,59 @@ def _render(args: argparse.Namespace) -> int:
     if not args.quiet:
         print(_summary(result, name), *outputs, sep="\n")
     return 0
+
+
+def _check(args: argparse.Namespace) -> int:
+    modes = list(Mode) if args.mode == ALL else [args.mode]
+    with _bad_input(args.parser):
+        scene = _resized(load_scene(args.scene), args.width, args.height)
+        for mode in modes:
+            Rendering(scene, check_spp(args.spp), mode=mode, sampler=args.sampler, seed=args.seed)
+        if args.output:
+            args.output.mkdir(parents=True, exist_ok=True)
+        backend.load()
+        reference = _reference(args, scene)
+    print(reference, flush=True)
+    passed = [_checked(args, reference, mode) for mode in modes]
+    return 0 if all(passed) else FAILED
+
+
+def _reference(args: argparse.Namespace, scene: Scene) -> Reference:
+    if args.against != MITSUBA.lower():
+        return stored_reference(scene, args.against, args.bounces)
+    bounces = 3 if args.bounces is None else args.bounces
+    with _pass_bar(MITSUBA) as on_pass:
+        return render_reference(scene, args.spp, bounces, args.seed, on_pass=on_pass)
+
+
+def _checked(args: argparse.Namespace, reference: Reference, mode: str) -> bool:
+    """Check one mode, print the report and write the maps; return whether nothing differs."""
+    with _pass_bar(mode) as on_pass:
+        report = check(
+            reference, mode, args.spp, sampler=args.sampler, seed=args.seed, on_pass=on_pass
+        )
+    print(f"\n{report}", flush=True)
+    passed = report.verdict != Verdict.FAIL
+    if args.output or not passed:
+        folder = args.output or Path(f"{Path(args.scene).stem}-check")
+        prefix = f"{report.mode}-{reference.bounces}-"
+        print("  maps", *save_maps(report.comparison, folder, prefix), sep="\n    ", flush=True)
+    return passed
+
+
+@contextmanager
+def _pass_bar(name: str) -> Iterator[Callable[[int], None]]:
+    """Draw a bar on a terminal while passes run; gives what is to be called after each."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(name), BarColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("", total=PASSES)
+        yield lambda passes: bar.update(task, completed=passes)
 
 
 def _scenes(_: argparse.Namespace) -> int:

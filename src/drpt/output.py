@@ -63,6 +63,7 @@ def write(
     metadata: Mapping[str, str | int | float],
     *,
     exposure: float = 0.0,
+    layers: Mapping[str, NDArray[np.float32]] | None = None,
 ) -> None:
     """Write a picture; the suffix of `path` chooses the format.
 
@@ -81,6 +82,8 @@ def write(
         where they would be mistaken for a number or are not ASCII).
     exposure
         Factor 2^exposure on the radiance of a PNG, in stops.
+    layers
+        More images of the same shape for an EXR, by the names of their layers; others have none.
 
     Raises
     ------
@@ -93,7 +96,7 @@ def write(
     with _replacing(Path(path)) as stream:
         match Path(path).suffix.lower():
             case ".exr":
-                _write_exr(stream, image, header)
+                _write_exr(stream, {"RGB": image, **(layers or {})}, header)
             case ".png":
                 _write_png(stream, image, header, exposure)
             case _:
@@ -114,6 +117,17 @@ def read_exr(
     ValueError
         It is not an EXR file with the channels R, G and B.
     """
+    layers, metadata = read_exr_layers(path)
+    return layers["RGB"], metadata
+
+
+def read_exr_layers(
+    path: str | os.PathLike[str],
+) -> tuple[dict[str, NDArray[np.float32]], dict[str, str | int | float]]:
+    """Read every layer of an RGB picture that has the channels R, G and B; see `read_exr`.
+
+    The picture itself is the layer ``"RGB"``, which must be there.
+    """
     import OpenEXR
 
     with open(path, "rb") as stream:
@@ -124,13 +138,18 @@ def read_exr(
     channels, header = file.channels(), file.header()
     if not {"R", "G", "B"} <= channels.keys():
         raise ValueError(f"{path}: its channels are {', '.join(channels)}, not R, G and B")
-    image = np.stack([channels[name].pixels for name in "RGB"], axis=-1)
+    prefixes = {name: f"{name}." for name in (n.rpartition(".")[0] for n in channels) if name}
+    layers = {
+        name: np.stack([channels[prefix + c].pixels for c in "RGB"], axis=-1).astype(np.float32)
+        for name, prefix in {"RGB": "", **prefixes}.items()
+        if {prefix + c for c in "RGB"} <= channels.keys()
+    }
     metadata = {
         name.removeprefix(_PREFIX): _from_text(text)
         for name, text in header.items()
         if name.startswith(_PREFIX)
     }
-    return image.astype(np.float32, copy=False), metadata
+    return layers, metadata
 
 
 def _target(path: Path) -> Path:
@@ -155,11 +174,14 @@ def _replacing(path: Path) -> Iterator[BinaryIO]:
         temporary.unlink(missing_ok=True)
 
 
-def _write_exr(stream: BinaryIO, image: NDArray[np.float32], header: dict[str, str]) -> None:
+def _write_exr(
+    stream: BinaryIO, layers: Mapping[str, NDArray[np.float32]], header: dict[str, str]
+) -> None:
     import OpenEXR
 
     layout = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
-    OpenEXR.File({**layout, **header}, {"RGB": image}).write(stream)
+    channels = {name: np.ascontiguousarray(layer, np.float32) for name, layer in layers.items()}
+    OpenEXR.File({**layout, **header}, channels).write(stream)
 
 
 def _write_png(
@@ -172,12 +194,12 @@ def _write_png(
         chunks.add_text(name, text)
     pixels = np.empty(image.shape, np.uint8)
     for row, radiance in zip(pixels, image, strict=True):
-        row[:] = _display(radiance, exposure)
+        row[:] = to_display(radiance, exposure)
     Image.fromarray(pixels).save(stream, format="PNG", pnginfo=chunks)
 
 
-def _display(radiance: NDArray[np.float32], exposure: float) -> NDArray[np.uint8]:
-    """Return what an 8-bit sRGB display is sent for linear radiance, shape (n, 3).
+def to_display(radiance: NDArray[np.floating[Any]], exposure: float = 0.0) -> NDArray[np.uint8]:
+    """Return what an 8-bit sRGB display is sent for linear radiance, shape (…, 3).
 
     Source: IEC 61966-2-1 (1999).
     """

@@ -42,11 +42,11 @@ def save_scene(scene: Scene, path: str | PathLike[str]) -> None:
         content = _npz(mesh)
         file = folder / f"{hashlib.sha256(content).hexdigest()[:16]}.npz"
         folder.mkdir(exist_ok=True)
-        _replace(file, content)
+        replace_file(file, content)
         return {"file": file.relative_to(path.parent).as_posix()}
 
     try:
-        _replace(path, _toml(scene, save_mesh).encode())
+        replace_file(path, _toml(scene, save_mesh).encode())
     except OSError as error:
         raise SceneError(f"it cannot be written: {error.strerror}", source=str(path)) from None
     except ValueError as error:  # a null character in the path, half a character in a text
@@ -119,7 +119,7 @@ def _npz(mesh: Mesh) -> bytes:
     return file.getvalue()
 
 
-def _replace(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes) -> None:
     """Write a file in one step: it is there as a whole, or as it was before."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:

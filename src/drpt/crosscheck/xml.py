@@ -1,0 +1,85 @@
+"""drpt's scenes as files that Mitsuba renders by itself."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from drpt.crosscheck.convert import surface, to_mitsuba_dict
+from drpt.crosscheck.variant import load_mitsuba
+from drpt.scene import Mesh, Phong, SceneError, checks
+from drpt.scene.saving import replace_file
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from drpt.scene import Scene
+
+SPP = 64
+"""Samples per pixel, which the file makes a parameter of Mitsuba's command line."""
+
+
+def to_mitsuba_xml(scene: Scene, path: str | PathLike[str], bounces: int = 3) -> None:
+    """Write a scene of diffuse surfaces as an XML file for Mitsuba's own command line.
+
+    Its meshes go into the folder ``<stem>-meshes`` beside it, as PLY files that are named by their
+    content. ``mitsuba -m scalar_rgb -D spp=256 -o picture.exr scene.xml`` then renders what
+    `to_mitsuba` does, with 256 samples per pixel instead of 64; ``-m llvm_ad_rgb`` is faster.
+
+    Raises
+    ------
+    drpt.SceneError
+        A surface is a Phong surface, which Mitsuba has not, or a file cannot be written.
+    ValueError
+        The variant that is set does not compute in RGB.
+    drpt.kernel.backend.BackendError
+        No usable libLLVM was found.
+    """
+    if not isinstance(path, str | os.PathLike) or not Path(path).name:
+        raise checks.refuse("", path, "the path of an XML file")
+    for index, shape in enumerate(scene.shapes):
+        if isinstance(shape.material, Phong):
+            raise SceneError(
+                "Mitsuba has no Phong surface; use Diffuse", f"shapes[{index}].material"
+            )
+    mi = load_mitsuba()
+    try:
+        _write(mi, scene, Path(path), bounces)
+    except (OSError, ValueError) as error:
+        problem = f"it cannot be written: {getattr(error, 'strerror', error)}"
+        raise SceneError(problem, source=str(path)) from None
+
+
+def _write(mi: Any, scene: Scene, path: Path, bounces: int) -> None:
+    """Write the meshes and then the scene; each file is replaced as a whole."""
+    folder = path.with_name(f"{path.stem}-meshes")
+    table = to_mitsuba_dict(scene, bounces)
+    for index, shape in enumerate(scene.shapes):
+        if isinstance(shape, Mesh):
+            file = _write_ply(mi, table[f"shape{index}"], folder)
+            table[f"shape{index}"] = _ply(shape, file.relative_to(path.parent))
+    table["sensor"]["sampler"]["sample_count"] = SPP
+    config = mi.parser.ParserConfig(mi.variant())
+    text = mi.parser.write_string(mi.parser.parse_dict(config, table))
+    replace_file(path, text.encode())
+
+
+def _write_ply(mi: Any, mesh: Any, folder: Path) -> Path:
+    stream = mi.MemoryStream()
+    mesh.write_ply(stream)
+    content = stream.raw_buffer()
+    file = folder / f"{hashlib.sha256(content).hexdigest()[:16]}.ply"
+    folder.mkdir(exist_ok=True)
+    replace_file(file, content)
+    return file
+
+
+def _ply(mesh: Mesh, file: Path) -> dict[str, Any]:
+    return {
+        "type": "ply",
+        "filename": file.as_posix(),
+        "face_normals": mesh.is_light or mesh.normals is None,
+        **surface(mesh),
+    }
