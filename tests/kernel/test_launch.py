@@ -167,3 +167,22 @@ def test_operations_do_not_depend_on_what_was_launched() -> None:
     before = launcher.operations()
     launcher.launch(range(128), range(3), 1, 0)
     assert launcher.operations() == before > 100
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+def test_passes_are_launches_of_their_own(sampler: str) -> None:
+    launcher = launcher_of(sampler=sampler)
+    pixels, samples = range(5, 100), range(8)
+    four = launcher.launch_passes(pixels, samples, range(4), 7)
+    assert four.radiance.shape == (4, 95, 3)
+    assert np.array_equal(four.radiance[0], launcher.launch(pixels, samples, 1, 7).radiance)
+    last = launcher.launch_passes(pixels, samples, range(3, 4), 7)
+    assert np.array_equal(last.radiance[0], four.radiance[3])
+    assert len({radiance.tobytes() for radiance in four.radiance}) == 4
+
+
+def test_passes_take_the_kernel_of_launches() -> None:
+    launcher = launcher_of()
+    launcher.launch(range(64), range(2), 1, 0)
+    work = lambda: launcher.launch_passes(range(64), range(8), range(5, 9), 3)  # noqa: E731
+    assert compiled_kernels(work) == 0

@@ -67,7 +67,7 @@ def measure(
     seed: int = 0,
     on_pass: OnPass = lambda passes: None,
 ) -> Estimate:
-    """Render a scene with drpt, in `PASSES` passes of different seeds.
+    """Render a scene with drpt, in `PASSES` independent passes.
 
     Parameters are those of :func:`drpt.render`, but ``spp`` is a multiple of `PASSES`; for
     ``on_pass`` see :func:`reference`. Raises `ValueError` like it.
@@ -78,10 +78,9 @@ def measure(
     at_once = max(1, LAUNCH_PATHS // (len(pixels) * per_pass))
 
     def sums() -> Iterator[NDArray[np.float64]]:
-        seeds = _seeds(seed)
         for first in range(0, PASSES, at_once):
-            group = seeds[first : first + at_once]
-            yield from launcher.launch_seeds(pixels, range(per_pass), group).radiance
+            group = range(first, min(first + at_once, PASSES))
+            yield from launcher.launch_passes(pixels, range(per_pass), group, seed).radiance
 
     return _estimate(scene, spp, sums(), on_pass)
 
@@ -127,8 +126,9 @@ def reference(
             return np.array(image, np.float64).reshape(-1, 3) * spp
 
         def sums() -> Iterator[NDArray[np.float64]]:
-            for seeds in np.array(_seeds(seed, PASSES * len(shares))).reshape(PASSES, -1):
-                yield np.sum([render(*part) for part in zip(shares, seeds, strict=True)], axis=0)
+            words = np.random.SeedSequence(seed).generate_state(PASSES * len(shares))
+            for group in words.reshape(PASSES, -1):
+                yield np.sum([render(*part) for part in zip(shares, group, strict=True)], axis=0)
 
         return _estimate(scene, spp, sums(), on_pass)
 
@@ -140,10 +140,6 @@ def check_spp(spp: int) -> int:
         allowed = f"a multiple of {PASSES} up to {MAX_SPP}"
         raise ValueError(f"spp: {spp!r} is not allowed; it must be {allowed}")
     return int(spp)
-
-
-def _seeds(seed: int, count: int = PASSES) -> list[int]:
-    return [int(word) for word in np.random.SeedSequence(seed).generate_state(count)]
 
 
 def _estimate(

@@ -19,7 +19,6 @@ from drpt.kernel.sampler import SAMPLERS
 from drpt.kernel.vec import vec2
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from types import ModuleType
 
     from drjit.auto import Array3f, Array3f64, UInt32
@@ -57,60 +56,59 @@ class Launcher:
         Each pixel takes ``replicates`` lanes that share its samples, each every so manyth. All of
         the arguments are inputs of one and the same kernel.
         """
-        word = _seed_word(seed, samples)
-        lanes = self._launch(pixels, samples, replicates, range(replicates), [word] * replicates)
+        word = _seed_word(seed) + (samples.start >> 32)
+        lanes = self._launch(pixels, samples, replicates, replicates, word)
         return lanes._replace(radiance=lanes.radiance.sum(axis=0))
 
-    def launch_seeds(self, pixels: range, samples: range, seeds: Sequence[int]) -> Sums:
-        """Trace a range of samples of each pixel in a range, once for each seed.
+    def launch_passes(self, pixels: range, samples: range, passes: range, seed: int) -> Sums:
+        """Trace a range of samples of each pixel in a range, once in each independent pass.
 
-        The same kernel as that of :meth:`launch`; ``radiance`` is (seeds, pixels, 3) here.
+        The same kernel as that of :meth:`launch`; ``radiance`` is (passes, pixels, 3) here.
         """
-        words = [_seed_word(seed, samples) for seed in seeds]
-        return self._launch(pixels, samples, 1, [0] * len(seeds), words)
+        return self._launch(pixels, samples, len(passes), 1, _seed_word(seed) + passes.start)
 
     def _launch(
-        self,
-        pixels: range,
-        samples: range,
-        stride: int,
-        starts: Sequence[int],
-        seed_words: Sequence[int],
+        self, pixels: range, samples: range, lanes: int, sharing: int, seed_word: int
     ) -> Sums:
         """Trace with several lanes for each pixel; ``radiance`` is (lanes, pixels, 3).
 
-        Of the samples, a lane takes every one that is a whole number of ``stride`` after its start.
+        So many after each other are ``sharing`` the samples of a seed; the next ones take the next.
         """
         index = self.tracer.scene.types.UInt32
-        lane = dr.arange(index, len(pixels) * len(starts))
-        first_pixel, count = dr.opaque(index, pixels.start), dr.opaque(index, len(pixels))
-        number = lane // count
-        start, seed = (
-            dr.gather(index, index(np.array(values, np.uint32)), number)
-            for values in (starts, seed_words)
+        numbers = (
+            pixels.start,
+            len(pixels),
+            samples.start & 0xFFFFFFFF,
+            len(samples),
+            sharing,
+            seed_word & 0xFFFFFFFF,
         )
-        first_sample = dr.opaque(index, samples.start & 0xFFFFFFFF)
-        end, step = dr.opaque(index, len(samples)), dr.opaque(index, stride)
-        pixel = first_pixel + lane - number * count
-        radiance, rays, non_finite = self._trace(pixel, first_sample, start, end, step, seed)
+        lane = dr.arange(index, len(pixels) * lanes)
+        radiance, rays, non_finite = self._trace(lane, *(dr.opaque(index, n) for n in numbers))
         with flush_denormals():
             dr.eval(radiance, rays, non_finite)
             dr.sync_thread()
         by_lane = np.stack([np.array(channel) for channel in radiance], axis=-1)
-        shape = len(starts), len(pixels), 3
-        return Sums(by_lane.reshape(shape), _total(rays), _total(non_finite))
+        by_pixel = by_lane.reshape(lanes, len(pixels), 3)
+        return Sums(by_pixel, _total(rays), _total(non_finite))
 
     def _trace(
         self,
-        pixel: UInt32,
+        lane: UInt32,
+        first_pixel: UInt32,
+        pixels: UInt32,
         first_sample: UInt32,
-        start: UInt32,
-        end: UInt32,
-        step: UInt32,
+        samples: UInt32,
+        sharing: UInt32,
         seed: UInt32,
     ) -> tuple[Array3f64, UInt32, UInt32]:
         """Sum up the samples of each lane: radiance, rays, and how many were not finite."""
         types = self.tracer.scene.types
+        number = lane // pixels
+        pixel = first_pixel + lane - number * pixels
+        which = number // sharing
+        start = number - which * sharing
+        seed = seed + which
 
         def add_sample(
             i: UInt32, total: Array3f64, rays: UInt32, non_finite: UInt32
@@ -118,16 +116,14 @@ class Launcher:
             radiance, traced = self._sample(self.sampler(pixel, first_sample + i, seed))
             x, y, z = (dr.isfinite(channel) for channel in radiance)
             return (
-                i + step,
+                i + sharing,
                 total + types.Array3f64(radiance),
                 rays + traced,
                 non_finite + dr.select(x & y & z, 0, 1),
             )
 
-        zeros = (
-            dr.zeros(t, dr.width(pixel)) for t in (types.Array3f64, types.UInt32, types.UInt32)
-        )
-        return dr.while_loop((start, *zeros), lambda i, *_: i < end, add_sample)[1:]
+        zeros = (dr.zeros(t, len(lane)) for t in (types.Array3f64, types.UInt32, types.UInt32))
+        return dr.while_loop((start, *zeros), lambda i, *_: i < samples, add_sample)[1:]
 
     def _sample(self, sampler: Sampler) -> tuple[Array3f, UInt32]:
         middle = self.tracer.scene.types.Float32(0.5)
@@ -158,10 +154,8 @@ def make_launcher(
     return Launcher(tracer, camera, SAMPLERS[sampler], jitter)
 
 
-def _seed_word(seed: int, samples: range) -> int:
-    """A seed as 32 bits; sample numbers beyond 2³² go on with the next one's."""
-    word = int(np.random.SeedSequence(seed).generate_state(1)[0])
-    return (word + (samples.start >> 32)) & 0xFFFFFFFF
+def _seed_word(seed: int) -> int:
+    return int(np.random.SeedSequence(seed).generate_state(1)[0])
 
 
 def _total(counts: UInt32) -> int:
