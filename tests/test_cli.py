@@ -538,3 +538,61 @@ def test_the_program_renders_what_the_function_renders() -> None:
     np.testing.assert_array_equal(image, expected.image)
     assert image.any()
     assert (metadata["spp"], metadata["mode"], metadata["seed"]) == (4, "explicit", 3)
+
+
+CHECK_FLAGS = ["--spp", "64", "--bounces", "1", "--width", "16", "--height", "12"]
+
+
+class TestCheck:
+    @pytest.mark.parametrize(
+        ("flags", "says"),
+        [
+            (["--mode", "fast"], "mode: 'fast'"),
+            (["--spp", "100"], "spp: 100 is not allowed; it must be a multiple of 64"),
+            (["--bounces", "-1"], "bounces: -1"),
+            (["--sampler", "halton"], "sampler: 'halton'"),
+            (["--width", "0"], "width: 0"),
+            (["--against", "no.exr"], "no.exr"),
+            (["--against", "good.toml"], "good.toml: this is not a readable EXR file"),
+            (["-o", "good.toml"], "good.toml"),
+        ],
+    )
+    def test_bad_input_is_refused(
+        self, flags: list[str], says: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        before = files()
+        assert status_of(cli.main, ["check", "good.toml", *flags]) == 2
+        printed, complaint = capsys.readouterr()
+        assert printed == ""
+        assert complaint.startswith("drpt check: error: ")
+        assert says in complaint
+        assert complaint.count("\n") == 1
+        assert files() == before
+
+    def test_all_modes_are_held_against_mitsuba(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert cli.main(["check", "good.toml", "--mode", "all", *CHECK_FLAGS]) == 0
+        printed, complaint = capsys.readouterr()
+        assert printed.startswith("reference: Mitsuba 3.9.1 (llvm_ad_rgb), 64 spp, 16x12, 1 bounce")
+        assert [mode for mode in drpt.Mode if f"\n{mode}, sobol, 64 spp: " in printed] == [
+            *drpt.Mode
+        ]
+        assert complaint == ""
+        assert files() == ["good.toml"]
+
+    def test_maps_are_written_where_they_are_asked_for(self) -> None:
+        assert cli.main(["check", "good.toml", "-o", "maps", *CHECK_FLAGS]) == 0
+        assert sorted(path.name for path in Path("maps").glob("*.exr")) == [
+            f"mis-1-{name}.exr" for name in ("difference", "image", "p-value", "reference")
+        ]
+
+    def test_a_picture_that_differs_fails(self, capsys: pytest.CaptureFixture[str]) -> None:
+        """The reference is brighter by a tenth; it tells its own bounces and size."""
+        scene = drpt.load_scene("good.toml")
+        picture = drpt.render(scene, 4096, 1)
+        output.write("a.exr", 1.1 * picture.image, picture.metadata)
+        assert cli.main(["check", "good.toml", "--against", "a.exr", "--spp", "65536"]) == 1
+        printed, _ = capsys.readouterr()
+        assert "reference: a.exr, 8x6, 1 bounce" in printed
+        assert "mis, sobol, 65536 spp: FAIL" in printed
+        assert "good-check/mis-1-p-value.png" in printed
+        assert Path("good-check/mis-1-difference.png").is_file()

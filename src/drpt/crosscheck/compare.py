@@ -207,9 +207,7 @@ class _Welch:
         """Two-sided p-values of values that should be equal; 0 where one is not finite."""
         from scipy import stats
 
-        known = np.isfinite(self.tolerance)
-        allowed = self.tolerance * np.abs(reference.mean) if known else np.inf
-        difference = np.abs(image.mean - reference.mean) - allowed
+        difference = np.abs(image.mean - reference.mean) - self.allowed(reference)
         error = np.maximum(_standard_error(image, reference), np.finfo(np.float64).tiny)
         t = np.maximum(difference, 0) / error
         p_value = 2 * stats.t.sf(t, self.degrees_of_freedom)
@@ -221,9 +219,13 @@ class _Welch:
 
         each = sidak(SIGNIFICANCE, comparisons)
         t = stats.t.isf([each / 2, 1 - POWER], self.degrees_of_freedom)
-        return np.asarray(
-            _standard_error(image, reference) * t.sum() + self.tolerance * np.abs(reference.mean)
-        )
+        seen = _standard_error(image, reference) * t.sum()
+        return np.asarray(seen + self.allowed(reference))
+
+    def allowed(self, reference: Value) -> Floats | float:
+        """Differences that are the reference's own."""
+        known = np.isfinite(self.tolerance)
+        return self.tolerance * np.abs(reference.mean) if known else np.inf
 
 
 def _test_image(test: _Welch, kept: NDArray[np.bool_]) -> ImageTest:

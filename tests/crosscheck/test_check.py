@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from drpt import Camera, Diffuse, Mesh, Mode, Phong, Scene, Sphere, load_scene
+from drpt.crosscheck import check, measure, render_reference, stored_reference
+from drpt.crosscheck.check import Verdict, light_edges
+from drpt.crosscheck.stored import save_estimate
+from tests.measuring import with_picture, with_radiance
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from drpt.crosscheck import Reference, Report
+
+SPP = 256
+WIDTH, HEIGHT = 24, 16
+TRIANGLE = [[-1, -1, 0], [1, -1, 0], [0, 1, 0]]
+
+
+def lit(radius: float = 1.0, distance: float = 3.0, exponent: float | None = None) -> Scene:
+    """A sphere under a light."""
+    material = Diffuse(0.5) if exponent is None else Phong(0.5, exponent)
+    light = Sphere((0, distance, 2), radius, radiance=(3, 2, 1))
+    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 30, WIDTH, HEIGHT)
+    return Scene(camera, [Sphere((0, 0, 0), 1, material), light])
+
+
+@pytest.fixture(scope="module")
+def reference() -> Reference:
+    return render_reference(lit(), SPP, 1)
+
+
+def against(reference: Reference, scene: Scene, tolerance: float = 0.0) -> Report:
+    """Check the picture of another scene against a reference."""
+    return check(replace(reference, scene=scene, tolerance=tolerance), spp=SPP)
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_drpt_agrees_with_mitsuba(reference: Reference, mode: Mode) -> None:
+    report = check(reference, mode, 16 * SPP)
+    assert report.verdict in (Verdict.PASS, Verdict.OPEN)
+    assert report.mode == mode
+    assert "Mitsuba 3.9.1 (llvm_ad_rgb), 256 spp, 24x16, 1 bounce" in str(reference)
+
+
+def test_a_report_tells_the_figures(reference: Reference) -> None:
+    report = check(reference, spp=16 * SPP)
+    test = report.comparison.of_image
+    text = str(report)
+    lines = text.splitlines()
+    assert text.startswith(f"mis, sobol, {16 * SPP} spp: {report.verdict}\n")
+    for channel, ours, theirs in zip("RGB", test.mean, test.reference, strict=True):
+        assert [channel, f"{ours:.6g}", f"{theirs:.6g}"] in [x.split()[:3] for x in lines]
+    for words in ("detects", "std. error", "means    p = ", "blocks   p = ", "worst: ", "FLIP"):
+        assert words in text
+
+
+def test_a_brighter_light_fails(reference: Reference) -> None:
+    report = against(reference, with_radiance(lit(), 1.05))
+    assert report.verdict == Verdict.FAIL
+    assert "FAIL" in str(report).splitlines()[0]
+
+
+def test_a_known_error_of_the_reference_is_allowed_for(reference: Reference) -> None:
+    report = against(reference, with_radiance(lit(), 1.05), tolerance=0.06)
+    assert report.verdict == Verdict.OPEN
+
+
+def test_mitsubas_lost_light_is_not_held_against_drpt() -> None:
+    far = render_reference(lit(0.003, 100), SPP, 1)
+    assert far.tolerance == np.inf
+    assert "it may be black there" in str(far)
+    assert check(far, spp=SPP).verdict == Verdict.OPEN
+
+
+def test_interpolated_normals_are_remarked_on() -> None:
+    smooth = Mesh(TRIANGLE, [[0, 1, 2]], [[0, 0, 1]] * 3, Diffuse(0.5))
+    scene = replace(lit(), shapes=(*lit().shapes, smooth))
+    assert "interpolated normals" in str(render_reference(scene, 64, 0))
+
+
+def test_few_samples_cannot_tell(reference: Reference) -> None:
+    assert check(reference, Mode.IMPLICIT_UNIFORM, 64).verdict == Verdict.OPEN
+
+
+def test_uniform_directions_and_sharp_lobes_cannot_tell() -> None:
+    sharp = render_reference(lit(exponent=1e4), SPP, 2)
+    report = check(sharp, Mode.IMPLICIT_UNIFORM, SPP)
+    assert (report.knows_its_errors, report.verdict) == (False, Verdict.OPEN)
+    assert "uniform directions meet sharp lobes too seldom" in str(report)
+    assert check(sharp, Mode.MIS, SPP).knows_its_errors
+    assert check(sharp, Mode.EXPLICIT_UNIFORM, SPP).knows_its_errors is False
+    once = replace(sharp, bounces=1)
+    assert check(once, Mode.EXPLICIT_UNIFORM, SPP).knows_its_errors
+
+
+def test_bounces_0_shows_the_lights_with_their_edges() -> None:
+    report = check(render_reference(load_small("cornell-box"), SPP, 0), spp=SPP)
+    assert report.verdict != Verdict.FAIL
+    assert report.comparison.of_image.mean[0] > 0.1
+
+
+def load_small(name: str) -> Scene:
+    return with_picture(load_scene(name), 16, 16)
+
+
+def test_edges_of_lights_are_found() -> None:
+    camera = Camera((0, 0, 4), (0, 0, 0), (0, 1, 0), 40, 32, 32)
+    edges = light_edges(Scene(camera, [Sphere((0, 0, 0), 1, radiance=1)]), 1024)
+    y, x = np.mgrid[:32, :32] - 15.5
+    apparent = 1 / np.sqrt(15) * 16 / np.tan(np.radians(20))
+    distance = np.abs(np.hypot(x, y) - apparent)
+    assert edges[distance < 0.3].all()
+    assert not edges[distance > 0.8].any()
+
+
+class TestStored:
+    def test_is_what_was_rendered(self, reference: Reference, tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        save_estimate(reference.estimate, path, {"renderer": "Mitsuba", "bounces": 1})
+        larger = with_picture(lit(), 4 * WIDTH, 4 * HEIGHT)
+        stored = stored_reference(larger, path)
+        assert (stored.scene.camera.width, stored.bounces) == (WIDTH, 1)
+        assert stored.tolerance == reference.tolerance
+        assert check(stored, spp=SPP).verdict != Verdict.FAIL
+
+    def test_may_be_of_anyone(self, tmp_path: Path) -> None:
+        save_estimate(measure(lit(), SPP, 3), tmp_path / "a.exr", {})
+        stored = stored_reference(lit(), tmp_path / "a.exr")
+        assert (stored.bounces, stored.tolerance, stored.remarks) == (3, 0, ())
+
+    def test_without_variances_is_taken_as_exact(self, tmp_path: Path) -> None:
+        from drpt import render
+
+        render(lit(), 4096, 1).save(tmp_path / "a.exr")
+        stored = stored_reference(lit(), tmp_path / "a.exr")
+        assert stored.bounces == 1
+        assert "tells no variances: it is taken as exact" in str(stored)
+
+    def test_tells_of_another_scene(self, tmp_path: Path) -> None:
+        from drpt import render
+
+        render(lit(radius=0.9), 64, 1).save(tmp_path / "a.exr")
+        assert "not quite this one" in str(stored_reference(lit(), tmp_path / "a.exr"))
+
+    def test_with_other_bounces_is_refused(self, tmp_path: Path) -> None:
+        save_estimate(measure(lit(), SPP, 1), tmp_path / "a.exr", {"bounces": 1})
+        with pytest.raises(ValueError, match="bounces: 2 is not allowed; it must be 1, as in"):
+            stored_reference(lit(), tmp_path / "a.exr", 2)
+
+    def test_of_another_shape_is_refused(self, tmp_path: Path) -> None:
+        save_estimate(measure(lit(), SPP, 1), tmp_path / "a.exr", {})
+        square = with_picture(lit(), 16, 16)
+        with pytest.raises(ValueError, match="its size, 24x16, has not the shape of"):
+            stored_reference(square, tmp_path / "a.exr")

@@ -1,0 +1,48 @@
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from drpt.crosscheck import Estimate
+from drpt.crosscheck.stored import load_estimate, save_estimate
+from drpt.output import write
+
+FLOAT32 = 1e-7  # relative: the files are float32
+
+
+def estimate() -> Estimate:
+    rng = np.random.default_rng(0)
+    return Estimate(rng.random((3, 4, 3)), 1e-9 * rng.random((3, 4, 3)), 64, 128)
+
+
+def test_an_estimate_comes_back(tmp_path: Path) -> None:
+    before = estimate()
+    save_estimate(before, tmp_path / "a.exr", {"bounces": 2, "renderer": "x"})
+    after, metadata = load_estimate(tmp_path / "a.exr")
+    assert after.mean.dtype == after.variance.dtype == np.float64
+    np.testing.assert_allclose(after.mean, before.mean, rtol=FLOAT32)
+    np.testing.assert_allclose(after.variance, before.variance, rtol=FLOAT32)
+    assert (after.passes, after.spp) == (64, 128)
+    assert metadata == {"bounces": 2, "renderer": "x", "passes": 64, "spp": 128}
+
+
+def test_other_programs_find_the_layers(tmp_path: Path) -> None:
+    save_estimate(estimate(), tmp_path / "a.exr", {})
+    channels = OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True).channels()
+    assert sorted(channels) == ["B", "G", "R", "variance.B", "variance.G", "variance.R"]
+
+
+def test_a_picture_without_variances_is_exact(tmp_path: Path) -> None:
+    write(tmp_path / "a.exr", np.ones((2, 2, 3), np.float32), {"spp": 16})
+    exact, _ = load_estimate(tmp_path / "a.exr")
+    assert not exact.variance.any()
+    assert exact.passes == 0
+
+
+@pytest.mark.parametrize("metadata", [{}, {"spp": 64}, {"spp": 64, "passes": 1}])
+def test_variances_need_passes(tmp_path: Path, metadata: dict[str, int]) -> None:
+    image = np.ones((2, 2, 3), np.float32)
+    write(tmp_path / "a.exr", image, metadata, layers={"variance": image})
+    with pytest.raises(ValueError, match=r"a\.exr: it has variances, but its metadata"):
+        load_estimate(tmp_path / "a.exr")
