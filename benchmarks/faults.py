@@ -10,7 +10,8 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from drpt.crosscheck import Comparison, Reference, compare, render_reference
-from drpt.crosscheck.check import SPP, light_edges
+from drpt.crosscheck.check import light_edges
+from drpt.crosscheck.references import SPP
 from tests.crosscheck.faults import BOUNCES, FAULTS, Fault, scenes
 
 if TYPE_CHECKING:

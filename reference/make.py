@@ -14,7 +14,7 @@ from time import perf_counter
 
 from drpt import Scene, load_scene
 from drpt.crosscheck import reference
-from drpt.crosscheck.check import MITSUBA
+from drpt.crosscheck.references import MITSUBA
 from drpt.crosscheck.stored import save_estimate
 from drpt.crosscheck.variant import VARIANT
 from drpt.scene.builtin import builtin_names

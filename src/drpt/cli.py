@@ -17,17 +17,16 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import drpt
 from drpt import doctor
-from drpt.crosscheck.check import (
+from drpt.crosscheck.check import Verdict, check
+from drpt.crosscheck.estimate import PASSES, check_spp
+from drpt.crosscheck.maps import save_maps
+from drpt.crosscheck.references import (
     MITSUBA,
     SPP,
     Reference,
-    Verdict,
-    check,
     render_reference,
     stored_reference,
 )
-from drpt.crosscheck.estimate import PASSES, check_spp
-from drpt.crosscheck.maps import save_maps
 from drpt.kernel import backend
 from drpt.output import SUFFIXES, check_target
 from drpt.render import SAMPLERS, Mode, Rendering

@@ -14,7 +14,7 @@ import drjit as dr
 
 from drpt import Diffuse, Mesh, Mode, Phong, Scene, Sphere, load_scene
 from drpt.crosscheck import Estimate, measure
-from drpt.crosscheck.check import SPP
+from drpt.crosscheck.references import SPP
 from drpt.kernel import intersect, path
 from drpt.kernel.brdf import Brdf
 from drpt.kernel.primitives import DIFFUSE

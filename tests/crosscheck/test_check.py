@@ -6,28 +6,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from drpt import Camera, Diffuse, Mesh, Mode, Phong, Scene, Sphere, load_scene
-from drpt.crosscheck import check, measure, render_reference, stored_reference
+from drpt import Camera, Mode, Scene, Sphere, load_scene
+from drpt.crosscheck import check, render_reference
 from drpt.crosscheck.check import Verdict, light_edges
-from drpt.crosscheck.stored import save_estimate
+from tests.crosscheck.lit import lit
 from tests.measuring import with_picture, with_radiance
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from drpt.crosscheck import Reference, Report
 
 SPP = 256
-WIDTH, HEIGHT = 24, 16
-TRIANGLE = [[-1, -1, 0], [1, -1, 0], [0, 1, 0]]
-
-
-def lit(radius: float = 1.0, distance: float = 3.0, exponent: float | None = None) -> Scene:
-    """A sphere under a light."""
-    material = Diffuse(0.5) if exponent is None else Phong(0.5, exponent)
-    light = Sphere((0, distance, 2), radius, radiance=(3, 2, 1))
-    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 30, WIDTH, HEIGHT)
-    return Scene(camera, [Sphere((0, 0, 0), 1, material), light])
 
 
 @pytest.fixture(scope="module")
@@ -78,12 +66,6 @@ def test_mitsubas_lost_light_is_not_held_against_drpt() -> None:
     assert check(far, spp=SPP).verdict == Verdict.OPEN
 
 
-def test_interpolated_normals_are_remarked_on() -> None:
-    smooth = Mesh(TRIANGLE, [[0, 1, 2]], [[0, 0, 1]] * 3, Diffuse(0.5))
-    scene = replace(lit(), shapes=(*lit().shapes, smooth))
-    assert "interpolated normals" in str(render_reference(scene, 64, 0))
-
-
 def test_few_samples_cannot_tell(reference: Reference) -> None:
     assert check(reference, Mode.IMPLICIT_UNIFORM, 64).verdict == Verdict.OPEN
 
@@ -117,44 +99,3 @@ def test_edges_of_lights_are_found() -> None:
     distance = np.abs(np.hypot(x, y) - apparent)
     assert edges[distance < 0.3].all()
     assert not edges[distance > 0.8].any()
-
-
-class TestStored:
-    def test_is_what_was_rendered(self, reference: Reference, tmp_path: Path) -> None:
-        path = tmp_path / "a.exr"
-        save_estimate(reference.estimate, path, {"renderer": "Mitsuba", "bounces": 1})
-        larger = with_picture(lit(), 4 * WIDTH, 4 * HEIGHT)
-        stored = stored_reference(larger, path)
-        assert (stored.scene.camera.width, stored.bounces) == (WIDTH, 1)
-        assert stored.tolerance == reference.tolerance
-        assert check(stored, spp=SPP).verdict != Verdict.FAIL
-
-    def test_may_be_of_anyone(self, tmp_path: Path) -> None:
-        save_estimate(measure(lit(), SPP, 3), tmp_path / "a.exr", {})
-        stored = stored_reference(lit(), tmp_path / "a.exr")
-        assert (stored.bounces, stored.tolerance, stored.remarks) == (3, 0, ())
-
-    def test_without_variances_is_taken_as_exact(self, tmp_path: Path) -> None:
-        from drpt import render
-
-        render(lit(), 4096, 1).save(tmp_path / "a.exr")
-        stored = stored_reference(lit(), tmp_path / "a.exr")
-        assert stored.bounces == 1
-        assert "tells no variances: it is taken as exact" in str(stored)
-
-    def test_tells_of_another_scene(self, tmp_path: Path) -> None:
-        from drpt import render
-
-        render(lit(radius=0.9), 64, 1).save(tmp_path / "a.exr")
-        assert "not quite this one" in str(stored_reference(lit(), tmp_path / "a.exr"))
-
-    def test_with_other_bounces_is_refused(self, tmp_path: Path) -> None:
-        save_estimate(measure(lit(), SPP, 1), tmp_path / "a.exr", {"bounces": 1})
-        with pytest.raises(ValueError, match="bounces: 2 is not allowed; it must be 1, as in"):
-            stored_reference(lit(), tmp_path / "a.exr", 2)
-
-    def test_of_another_shape_is_refused(self, tmp_path: Path) -> None:
-        save_estimate(measure(lit(), SPP, 1), tmp_path / "a.exr", {})
-        square = with_picture(lit(), 16, 16)
-        with pytest.raises(ValueError, match="its size, 24x16, has not the shape of"):
-            stored_reference(square, tmp_path / "a.exr")

@@ -149,7 +149,10 @@ def exact_passes(mean: Floats | float) -> Estimate:
 
 def test_certain_values_may_differ_by_roundings() -> None:
     assert compare(exact_passes(1 + 5e-7), exact(1)).passed
-    assert not compare(exact_passes(1 + 5e-6), exact(1)).passed
+    wrong = compare(exact_passes(1 + 5e-6), exact(1))
+    assert not wrong.passed
+    assert wrong.of_blocks.worst is not None
+    assert wrong.of_blocks.worst.errors == np.inf
 
 
 def test_a_tolerance_is_not_held_against_the_image() -> None:

@@ -51,8 +51,10 @@ class ImageTest:
 
     Attributes
     ----------
+    pixels
+        How many pixels were counted.
     mean, reference
-        Mean of all pixels.
+        Their mean in both images.
     standard_error
         Of their difference.
     p_value
@@ -61,6 +63,7 @@ class ImageTest:
         Smallest difference that would have been detected, with the probability `POWER`.
     """
 
+    pixels: int
     mean: Floats
     reference: Floats
     standard_error: Floats
@@ -88,6 +91,14 @@ class Block(NamedTuple):
     mean: float
     reference: float
     standard_error: float  # of the difference
+
+    @property
+    def errors(self) -> float:
+        """The difference in standard errors."""
+        difference = self.mean - self.reference
+        if self.standard_error == 0:
+            return float(np.copysign(np.inf, difference))
+        return difference / self.standard_error
 
     def __str__(self) -> str:
         size = f"pixel ({self.column}, {self.row})"
@@ -234,7 +245,8 @@ def _test_image(test: _Welch, kept: NDArray[np.bool_]) -> ImageTest:
     p_value = of_any(float(test.p_value(image, reference).min()), channels)
     detectable = test.detectable(image, reference, channels)
     error = _standard_error(image, reference)
-    return ImageTest(image.mean, reference.mean, error, p_value, detectable)
+    pixels = int(kept.sum())
+    return ImageTest(pixels, image.mean, reference.mean, error, p_value, detectable)
 
 
 def _mean(image: Value) -> Value:
