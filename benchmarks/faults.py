@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from drpt.crosscheck import Comparison, Reference, compare, render_reference
 from drpt.crosscheck.check import light_edges
 from drpt.crosscheck.references import SPP
-from tests.crosscheck.faults import BOUNCES, FAULTS, Fault, scenes
+from tests.crosscheck.faults import BOUNCE, BOUNCES, FAULTS, WHOLE, Fault, scenes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,11 +29,18 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for fault in FAULTS:
         size, tests = smallest(fault)
-        sizes = (f"{s:.2g} {fault.unit}" if fault.unit else "-" for s in (fault.size, size))
+        sizes = (shown(s, fault.unit) for s in (fault.size, size))
         camera = scenes()[fault.scene].camera
         pixels = f"{camera.width}²"
         cells = fault.name, fault.scene, pixels, fault.mode, *sizes, tests
         print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def shown(size: float, unit: str) -> str:
+    """A size with its unit, shares of a whole in percent."""
+    if unit == WHOLE:
+        return f"{100 * size:.2g} % of it"
+    return f"{abs(size):.2g} {unit}"
 
 
 def smallest(fault: Fault) -> tuple[float, str]:
@@ -41,7 +48,7 @@ def smallest(fault: Fault) -> tuple[float, str]:
     size, found = fault.size, checked(fault, fault.size)
     if found.passed:
         return float("nan"), "not found"
-    while fault.unit and not (smaller := checked(fault, size * SHRINK)).passed:
+    while fault.unit != BOUNCE and not (smaller := checked(fault, size * SHRINK)).passed:
         size, found = size * SHRINK, smaller
     passed = {"means": found.of_image.passed, "blocks": found.of_blocks.passed}
     return size, " and ".join(name for name, test_passed in passed.items() if not test_passed)

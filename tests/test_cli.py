@@ -554,7 +554,8 @@ class TestCheck:
             (["--width", "0"], "width: 0"),
             (["--against", "no.exr"], "no.exr"),
             (["--against", "good.toml"], "good.toml: this is not a readable EXR file"),
-            (["-o", "good.toml"], "good.toml"),
+            (["-o", "good.toml"], "good.toml: this is a file, and maps need a folder"),
+            (["--against", "a.npy"], "a.npy: No such file or directory"),
         ],
     )
     def test_bad_input_is_refused(
@@ -584,6 +585,30 @@ class TestCheck:
         assert sorted(path.name for path in Path("maps").glob("*.exr")) == [
             f"mis-1-{name}.exr" for name in ("difference", "image", "p-value", "reference")
         ]
+
+    @pytest.mark.parametrize(
+        ("flags", "says"),
+        [
+            (["--width", "16", "--height", "12"], "width: 16 is not allowed; it must be 8, as in"),
+            (["--bounces", "2"], "bounces: 2 is not allowed; it must be 1, as in a.exr"),
+        ],
+    )
+    def test_settings_must_be_those_of_the_reference(
+        self, flags: list[str], says: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        drpt.render(drpt.load_scene("good.toml"), 4, 1).save("a.exr")
+        command = ["check", "good.toml", "--against", "a.exr", "--spp", "64", "-o", "maps"]
+        assert status_of(cli.main, [*command, *flags]) == 2
+        assert says in capsys.readouterr().err
+        assert files() == ["a.exr", "good.toml"]
+
+    def test_nobody_who_reads_it_is_no_pass(self) -> None:
+        script = "from drpt.cli import main; import sys; sys.exit(main())"
+        command = [sys.executable, "-c", script, "check", "good.toml", *CHECK_FLAGS]
+        reader, writer = os.pipe()
+        os.close(reader)
+        assert subprocess.run(command, stdout=writer, check=False).returncode == 1
+        os.close(writer)
 
     def test_a_picture_that_differs_fails(self, capsys: pytest.CaptureFixture[str]) -> None:
         """The reference is brighter by a tenth; it tells its own bounces and size."""

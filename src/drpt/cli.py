@@ -21,6 +21,7 @@ from drpt.crosscheck.check import Verdict, check
 from drpt.crosscheck.estimate import PASSES, check_spp
 from drpt.crosscheck.maps import save_maps
 from drpt.crosscheck.references import (
+    BOUNCES,
     MITSUBA,
     SPP,
     Reference,
@@ -58,10 +59,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     SystemExit
         With status 2 on bad usage or a bad scene, with 0 after ``--help`` and ``--version``.
     """
-    program = "drpt"
+    program, unread = "drpt", 0
     try:
         args = _parse(argv)
-        program = args.parser.prog
+        program, unread = args.parser.prog, getattr(args, "unread", 0)
         status: int = args.run(args)
         print(end="", flush=True)
     except KeyboardInterrupt:
@@ -69,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         _drop_stdout()
-        return 0
+        return unread
     except (OSError, MemoryError, backend.BackendError) as error:
         _say(f"{program}: error: {error}")
         return FAILED
@@ -259,7 +260,7 @@ exit status: 0; 1 if a picture differs or the run failed; 2 for bad input; 130 a
     _add_size(parser)
     _add_transport(parser.add_argument_group("light"), modes=(*Mode, ALL))
     _add_sampling(parser.add_argument_group("samples"), spp=SPP)
-    parser.set_defaults(parser=parser, run=_check, bounces=None)
+    parser.set_defaults(parser=parser, run=_check, bounces=None, unread=FAILED)
 
 
 def _add_scenes(commands: _Commands) -> None:
@@ -349,28 +350,45 @@ def _render(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> int:
     modes = list(Mode) if args.mode == ALL else [args.mode]
+    bounces = BOUNCES if args.bounces is None else args.bounces
+    folder: Path = args.output or Path(f"{Path(args.scene).stem}-check")
+    reference = None
     with _bad_input(args.parser):
         scene = _resized(load_scene(args.scene), args.width, args.height)
         for mode in modes:
-            Rendering(scene, check_spp(args.spp), mode=mode, sampler=args.sampler, seed=args.seed)
+            settings = {"sampler": args.sampler, "seed": args.seed}
+            Rendering(scene, check_spp(args.spp), bounces, mode, **settings)
+        if args.against != MITSUBA.lower():
+            reference = _stored(args, scene)
+        if folder.exists() and not folder.is_dir():
+            raise NotADirectoryError(f"{folder}: this is a file, and maps need a folder")
         if args.output:
-            args.output.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
         backend.load()
-        reference = _reference(args, scene)
+    if reference is None:
+        with _pass_bar(MITSUBA) as on_pass:
+            reference = render_reference(scene, args.spp, bounces, args.seed, on_pass=on_pass)
     print(reference, flush=True)
-    passed = [_checked(args, reference, mode) for mode in modes]
+    passed = [_checked(args, reference, mode, folder) for mode in modes]
     return 0 if all(passed) else FAILED
 
 
-def _reference(args: argparse.Namespace, scene: Scene) -> Reference:
-    if args.against != MITSUBA.lower():
-        return stored_reference(scene, args.against, args.bounces)
-    bounces = 3 if args.bounces is None else args.bounces
-    with _pass_bar(MITSUBA) as on_pass:
-        return render_reference(scene, args.spp, bounces, args.seed, on_pass=on_pass)
+def _stored(args: argparse.Namespace, scene: Scene) -> Reference:
+    """Read the reference; a size that was asked for must be its."""
+    reference = stored_reference(scene, args.against, args.bounces)
+    camera = reference.scene.camera
+    for name, asked, size in (
+        ("width", args.width, camera.width),
+        ("height", args.height, camera.height),
+    ):
+        if asked not in (None, size):
+            raise ValueError(
+                f"{name}: {asked} is not allowed; it must be {size}, as in {args.against}"
+            )
+    return reference
 
 
-def _checked(args: argparse.Namespace, reference: Reference, mode: str) -> bool:
+def _checked(args: argparse.Namespace, reference: Reference, mode: str, folder: Path) -> bool:
     """Check one mode, print the report and write the maps; return whether nothing differs."""
     with _pass_bar(mode) as on_pass:
         report = check(
@@ -379,7 +397,6 @@ def _checked(args: argparse.Namespace, reference: Reference, mode: str) -> bool:
     print(f"\n{report}", flush=True)
     passed = report.verdict != Verdict.FAIL
     if args.output or not passed:
-        folder = args.output or Path(f"{Path(args.scene).stem}-check")
         prefix = f"{report.mode}-{reference.bounces}-"
         print("  maps", *save_maps(report.comparison, folder, prefix), sep="\n    ", flush=True)
     return passed
@@ -486,7 +503,10 @@ def _bad_input(parser: _Parser) -> Iterator[None]:
     """Turn what is wrong with the input into the parser's error."""
     try:
         yield
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        named = error.filename and error.strerror
+        parser.error(f"{error.filename}: {error.strerror}" if named else str(error))
+    except ValueError as error:
         parser.error(str(error))
 
 

@@ -133,9 +133,9 @@ def read_exr_layers(
     with open(path, "rb") as stream:
         try:
             file = OpenEXR.File(stream, separate_channels=True)
-        except RuntimeError as error:
+            channels, header = file.channels(), file.header()
+        except (RuntimeError, ValueError) as error:
             raise ValueError(f"{path}: this is not a readable EXR file ({error})") from error
-    channels, header = file.channels(), file.header()
     if not {"R", "G", "B"} <= channels.keys():
         raise ValueError(f"{path}: its channels are {', '.join(channels)}, not R, G and B")
     prefixes = {name: f"{name}." for name in (n.rpartition(".")[0] for n in channels) if name}

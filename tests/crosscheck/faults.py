@@ -32,6 +32,8 @@ GLOSSY = "cornell-box-glossy"
 ROOM = "cornell-box with glossy walls"
 PLATE = "cornell-box with a plate"
 BOUNCES = 3
+WHOLE, BOUNCE = "of it", "bounce"
+"""Units of faults that are a share of something, or cannot be smaller than 1."""
 SIDE = {GLOSSY: 256}
 """Pixels of the square pictures; `SMALL` of the others."""
 SMALL = 128
@@ -213,12 +215,12 @@ FAULTS = [
     Fault("exponent too high", 2, "%", in_scene(sharper_lobe), GLOSSY),
     Fault("radiance too high", 0.3, "%", in_scene(brighter_light)),
     Fault("light moved sideways", 1, "% of its radius", in_scene(moved_light)),
-    Fault("a bounce too many", 1, "", more_bounces),
-    Fault("a bounce too few", -1, "", more_bounces),
-    Fault("cosine missing", 1, "of it", in_kernel(no_cosine), mode=Mode.EXPLICIT),
-    Fault("red and blue swapped", 1, "of them", in_image(lambda image: image[..., ::-1])),
-    Fault("image mirrored", 1, "of it", in_image(lambda image: image[:, ::-1])),
-    Fault("light counted twice", 1, "of it", counted_twice, mode=Mode.EXPLICIT),
-    Fault("lobe renormalised at the horizon", 1, "of it", in_kernel(renormalised), ROOM),
+    Fault("a bounce too many", 1, BOUNCE, more_bounces),
+    Fault("a bounce too few", -1, BOUNCE, more_bounces),
+    Fault("cosine missing", 1, WHOLE, in_kernel(no_cosine), mode=Mode.EXPLICIT),
+    Fault("red and blue swapped", 1, WHOLE, in_image(lambda image: image[..., ::-1])),
+    Fault("image mirrored", 1, WHOLE, in_image(lambda image: image[:, ::-1])),
+    Fault("light counted twice", 1, WHOLE, counted_twice, mode=Mode.EXPLICIT),
+    Fault("lobe renormalised at the horizon", 1, WHOLE, in_kernel(renormalised), ROOM),
     Fault("shadow rays stopped short", 1, "%", in_kernel(stopped_short), PLATE),
 ]

@@ -8,7 +8,7 @@ import pytest
 
 from drpt import Camera, Mode, Scene, Sphere, load_scene
 from drpt.crosscheck import check, render_reference
-from drpt.crosscheck.check import Verdict, light_edges
+from drpt.crosscheck.check import Verdict, light_edges, samples_needed
 from tests.crosscheck.lit import lit
 from tests.measuring import with_picture, with_radiance
 
@@ -73,12 +73,24 @@ def test_few_samples_cannot_tell(reference: Reference) -> None:
 def test_uniform_directions_and_sharp_lobes_cannot_tell() -> None:
     sharp = render_reference(lit(exponent=1e4), SPP, 2)
     report = check(sharp, Mode.IMPLICIT_UNIFORM, SPP)
-    assert (report.knows_its_errors, report.verdict) == (False, Verdict.OPEN)
+    assert (report.comparison.of_image.resolved, report.verdict) == (False, Verdict.OPEN)
     assert "uniform directions meet sharp lobes too seldom" in str(report)
-    assert check(sharp, Mode.MIS, SPP).knows_its_errors
-    assert check(sharp, Mode.EXPLICIT_UNIFORM, SPP).knows_its_errors is False
-    once = replace(sharp, bounces=1)
-    assert check(once, Mode.EXPLICIT_UNIFORM, SPP).knows_its_errors
+
+
+@pytest.mark.parametrize(
+    ("mode", "bounces", "expected"),
+    [
+        (Mode.MIS, 3, 0),
+        (Mode.IMPLICIT, 3, 0),
+        (Mode.IMPLICIT_UNIFORM, 0, 1000),
+        (Mode.IMPLICIT_UNIFORM, 2, 1000 * 101**2),
+        (Mode.EXPLICIT_UNIFORM, 1, 1000),
+        (Mode.EXPLICIT_UNIFORM, 3, 1000 * 101**2),
+    ],
+)
+def test_uniform_directions_in_lobes_need_samples(mode: Mode, bounces: int, expected: int) -> None:
+    assert samples_needed(lit(exponent=100), bounces, mode) == expected
+    assert samples_needed(lit(), bounces, mode) == 0
 
 
 def test_bounces_0_shows_the_lights_with_their_edges() -> None:

@@ -198,3 +198,34 @@ def test_a_comparison_says_which_test_failed() -> None:
     comparison: Comparison = compare(normal(0, 1.05), normal(1))
     assert not comparison.of_image.passed
     assert not comparison.passed
+
+
+def test_rare_samples_must_have_been_drawn() -> None:
+    """A block of 16 pixels has 1024 samples, 64 each."""
+    dark = compare(normal(0, 0.9), normal(1), min_samples=1000)
+    assert not dark.of_image.passed
+    assert dark.of_blocks.side == 4
+    unknown = compare(normal(0, 0.9), normal(1), min_samples=10**6)
+    assert unknown.passed
+    assert not unknown.of_image.resolved
+    assert unknown.of_blocks.comparisons == 0
+
+
+def test_light_in_the_dark_fails() -> None:
+    """The reference is black on the left, and the image has a bright pixel there."""
+    half = np.where(np.arange(SHAPE[1])[None, :, None] < 10, 0.0, 1.0)
+    right = compare(normal(0, half), normal(1, half))
+    assert right.passed
+    wrong = compare(with_mean(normal(0, half), (5, 3, 0), 0.1), normal(1, half))
+    assert not wrong.of_blocks.passed
+    assert wrong.of_blocks.worst is not None
+    assert wrong.of_blocks.worst[:4] == (3, 5, 1, 0)
+
+
+def test_edges_count_where_all_else_is_black() -> None:
+    edges = np.ones(SHAPE[:2], np.bool_)
+    wrong = compare(normal(0, 1.05), normal(1), edges=edges)
+    assert not wrong.of_image.passed
+    edges[0] = False
+    lit = normal(1, np.where(edges, 1.0, 0.0)[..., None])
+    assert compare(lit, lit, edges=edges).of_image.pixels == SHAPE[0] * SHAPE[1]

@@ -9,11 +9,13 @@ from drpt.crosscheck.domain import (
     MAX_SINE,
     MIN_SINE,
     SERIES_SINE,
+    UNIT,
     VANISHING_SINE,
     Caveat,
     caveats,
     emulated_error,
     light_error,
+    ray_offset,
     tolerance,
 )
 from drpt.scene import Shape, builtin_names
@@ -214,3 +216,28 @@ def test_the_reach_on_a_sphere_is_that_of_its_lit_points(between: float) -> None
     lit = distance if between < ball.radius else distance[outside]
     scene = Scene(CAMERA, [ball, lamp])
     assert tolerance(scene) == pytest.approx(float(light_error(0.25 / lit.max())), rel=1e-4)
+
+
+@pytest.mark.parametrize("point", [(0.0, 0, 0), (1e-6, 0, 2e-6), (3.0, -400, 7), (1e4, 1e4, 1e4)])
+def test_mitsubas_rays_start_off_their_surface(mi: Any, point: tuple[float, ...]) -> None:
+    import drjit as dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.p, si.n = mi.Point3f(*point), mi.Normal3f(0, 0, 1)
+    start = np.array(si.spawn_ray(mi.Vector3f(0, 0, 1)).o).ravel()[2]
+    expected = 1500 * UNIT * (1 + np.abs(point).max())
+    assert start - point[2] == pytest.approx(expected, rel=0.02)  # float32 at 1e4
+
+
+@pytest.mark.parametrize(
+    ("scale", "shift", "known"), [(1, 0, True), (1e-3, 0, False), (1, 99, False)]
+)
+def test_rays_must_not_start_far_off_their_surfaces(
+    scale: float, shift: float, known: bool
+) -> None:
+    floor = Mesh(scale * FLOOR.vertices + [shift, 0, 0], FLOOR.faces, None, Diffuse(1))
+    lamp = Sphere((shift, 2 * scale, 0), 0.5 * scale, radiance=1)
+    scene = Scene(CAMERA, [floor, lamp])
+    reach = scale * 2.5 + shift
+    assert ray_offset(scene) == pytest.approx(1500 * UNIT * (1 + reach) / (2.5 * scale), rel=0.02)
+    assert np.isfinite(tolerance(scene)) == known

@@ -318,3 +318,36 @@ def test_the_variant_that_is_set_counts(mi: Any) -> None:
         assert mi.variant() == "scalar_rgb"
     finally:
         mi.set_variant(before)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "says"),
+    [
+        ({"film": {"type": "hdrfilm", "width": 0}}, "its size is 0x576; it must have pixels"),
+        ({"film": {"type": "hdrfilm", "width": 2.5}}, "its width is 2.5; it must be a whole"),
+        ({"fov": "wide"}, "its fov is 'wide'; it must be a number"),
+        ({"fov": 200.0}, "its fov is 200; it must be > 0 and < 180 degrees"),
+        ({"focal_length": "5cm"}, "its focal_length is '5cm'; it must be millimetres"),
+        ({"focal_length": 50.0}, "its focal_length is 50.0; it must be a text"),
+        ({"focal_length": "-5mm"}, "its focal_length is '-5mm'"),
+        ({"focal_length": "50mm", "fov": 40.0}, "it has both a fov and a focal_length"),
+        ({"a": {"type": "hdrfilm"}, "b": {"type": "hdrfilm"}}, "it has 2 elements <film>"),
+    ],
+)
+def test_wrong_sensors_are_refused(sensor: dict[str, Any], says: str) -> None:
+    wrong = {"type": "perspective", **sensor}
+    with pytest.raises(SceneError, match=says):
+        from_mitsuba(scene_dict(sensor=wrong, ball={"type": "sphere", "b": GREY}))
+
+
+@pytest.mark.parametrize(
+    ("shape", "says"),
+    [
+        ({"type": "sphere", "radius": "big"}, "its radius is 'big'; it must be a number"),
+        ({"type": "disk", "flip_normals": "no"}, "its flip_normals is 'no'; it must be true or"),
+        ({"type": "sphere", "other": GREY}, "it has 2 elements <bsdf>; it must have one"),
+    ],
+)
+def test_wrong_shapes_are_refused(shape: dict[str, Any], says: str) -> None:
+    with pytest.raises(SceneError, match=says):
+        from_mitsuba(scene_dict(wrong={"b": GREY, **shape}))

@@ -40,9 +40,36 @@ def test_a_picture_without_variances_is_exact(tmp_path: Path) -> None:
     assert exact.passes == 0
 
 
-@pytest.mark.parametrize("metadata", [{}, {"spp": 64}, {"spp": 64, "passes": 1}])
-def test_variances_need_passes(tmp_path: Path, metadata: dict[str, int]) -> None:
+@pytest.mark.parametrize(
+    ("metadata", "says"),
+    [
+        ({}, "its passes is None; it must be a whole number >= 2"),
+        ({"spp": 64, "passes": 1}, "its passes is 1; it must be a whole number >= 2"),
+        ({"spp": 64, "passes": "many"}, "its passes is 'many'"),
+        ({"spp": 64.0, "passes": 64}, "its spp is 64.0"),
+    ],
+)
+def test_variances_need_passes(tmp_path: Path, metadata: dict[str, int], says: str) -> None:
     image = np.ones((2, 2, 3), np.float32)
     write(tmp_path / "a.exr", image, metadata, layers={"variance": image})
-    with pytest.raises(ValueError, match=r"a\.exr: it has variances, but its metadata"):
+    with pytest.raises(ValueError, match=says):
         load_estimate(tmp_path / "a.exr")
+
+
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+@pytest.mark.parametrize("layer", ["RGB", "variance"])
+def test_values_must_be_possible(tmp_path: Path, layer: str, value: float) -> None:
+    layers = {name: np.ones((4, 4, 3), np.float32) for name in ("RGB", "variance")}
+    layers[layer][2, 1, 0] = value
+    image = layers.pop("RGB")
+    write(tmp_path / "a.exr", image, {"spp": 64, "passes": 64}, layers=layers)
+    with pytest.raises(ValueError, match=r"a\.exr: its \w+ is .* at pixel \(1, 2\); it must be"):
+        load_estimate(tmp_path / "a.exr")
+
+
+@pytest.mark.parametrize("scale", [1e-40, 1e40])
+def test_variances_must_fit(tmp_path: Path, scale: float) -> None:
+    wide = Estimate(estimate().mean, scale * np.ones((3, 4, 3)), 64, 64)
+    with pytest.raises(ValueError, match="its variances do not fit float32"):
+        save_estimate(wide, tmp_path / "a.exr", {})
+    assert not list(tmp_path.iterdir())

@@ -102,3 +102,9 @@ def test_mitsubas_command_line_renders_it(tmp_path: Path) -> None:
     assert theirs.dtype == np.float32
     assert theirs.shape == ours.shape
     np.testing.assert_allclose(theirs.mean((0, 1)), ours.mean((0, 1)), rtol=TOLERANCE)
+
+
+def test_a_name_that_mitsuba_would_not_read_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"its name holds a \$"):
+        to_mitsuba_xml(load_scene("cornell-box"), tmp_path / "a $x.xml")
+    assert not list(tmp_path.iterdir())

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TELLING = 0.01
 """Difference of the means, relative, that a check must be able to detect to say "pass"."""
 MIN_EVENTS = 1000
-"""Of the rarest samples that matter: fewer do not tell how much they vary."""
+"""Samples of the rarest kind that matters: fewer do not tell how much they vary."""
 UNIFORM = "uniform directions meet sharp lobes too seldom to tell how uncertain the picture is"
 
 
@@ -60,29 +60,11 @@ class Report:
     @property
     def verdict(self) -> Verdict:
         """Whether the picture has the reference's expectation, as far as can be told."""
-        if not self.knows_its_errors:
-            return Verdict.OPEN
         if not self.comparison.passed:
             return Verdict.FAIL
         test = self.comparison.of_image
-        telling = test.detectable <= TELLING * np.abs(test.reference)
+        telling = test.resolved & (test.detectable <= TELLING * np.abs(test.reference))
         return Verdict.PASS if telling.all() else Verdict.OPEN
-
-    @property
-    def knows_its_errors(self) -> bool:
-        """Whether the image has samples enough to estimate its own errors.
-
-        Of uniform directions, one in (α + 1) meets a lobe of exponent α, and weighs as much: of k
-        of them one after the other, one in (α + 1)^k. Where these are hardly ever drawn, the image
-        is too dark and seems more certain than it is.
-        """
-        scene, bounces = self.reference.scene, self.reference.bounces
-        lobes = [s.material.exponent for s in scene.shapes if isinstance(s.material, Phong)]
-        if self.mode.samples_brdf or not lobes:
-            return True
-        choices = bounces if self.mode.counts_hits else max(bounces - 1, 0)
-        paths = scene.camera.width * scene.camera.height * self.comparison.image.spp
-        return bool(paths >= MIN_EVENTS * (max(lobes) + 1) ** choices)
 
     def __str__(self) -> str:
         lines = [self._row("mean", "drpt", "reference", "difference", "std. error", "detects")]
@@ -95,7 +77,7 @@ class Report:
         lines.append(f"  blocks   {self._blocks()}")
         if self.flip is not None:
             lines.append(f"  FLIP     {self.flip:.4f}")
-        if not self.knows_its_errors:
+        if not test.resolved:
             lines.append(f"  {UNIFORM}")
         spp = self.comparison.image.spp
         return "\n".join([f"{self.mode}, {self.sampler}, {spp} spp: {self.verdict}", *lines])
@@ -111,10 +93,11 @@ class Report:
     def _blocks(self) -> str:
         test = self.comparison.of_blocks
         if test.worst is None:
-            return "none is certain enough to be compared"
+            black = not (self.comparison.image.mean.any() or self.reference.estimate.mean.any())
+            return "both are black" if black else "none is certain enough to be compared"
         parts = [
             f"p = {test.p_value:.2g}, {100 * test.passing:.4g} % of the pixels pass",
-            f"worst: {test.worst} ({test.worst.errors:+.1f} standard errors)",
+            f"worst: {test.worst} ({test.worst.errors:+.3g} standard errors)",
         ]
         if test.side:
             size = "one pixel" if test.side == 1 else f"{test.side}x{test.side} pixels"
@@ -154,9 +137,28 @@ def check(
     scene, bounces = against.scene, against.bounces
     image = measure(scene, spp, bounces, mode, sampler=sampler, seed=seed, on_pass=on_pass)
     edges = light_edges(scene, spp) if bounces else None
-    comparison = compare(image, against.estimate, edges=edges, tolerance=against.tolerance)
+    comparison = compare(
+        image,
+        against.estimate,
+        edges=edges,
+        tolerance=against.tolerance,
+        min_samples=samples_needed(scene, bounces, Mode(mode)),
+    )
     flip = mean_flip(image.mean, against.estimate.mean) if has_flip() else None
     return Report(Mode(mode), sampler, against, comparison, flip)
+
+
+def samples_needed(scene: Scene, bounces: int, mode: Mode) -> int:
+    """How many samples must have been drawn to tell how much they vary, if that matters.
+
+    Of uniform directions, one in α + 1 meets a lobe of exponent α, and weighs as much; of k of them
+    one after the other, one in (α + 1)^k. Directions by the BRDF know nothing of the kind.
+    """
+    lobes = [s.material.exponent for s in scene.shapes if isinstance(s.material, Phong)]
+    if mode.samples_brdf or not lobes:
+        return 0
+    choices = bounces if mode.counts_hits else max(bounces - 1, 0)
+    return int(MIN_EVENTS * (int(max(lobes)) + 1) ** choices)
 
 
 def light_edges(scene: Scene, spp: int) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ Two tests answer, each wrong with a probability of `SIGNIFICANCE` at the most wh
 
 Both are Welch's t-test with the smaller of both images' degrees of freedom, which is conservative,
 and Šidák's correction (1967) for the number of values compared. A t-test wants means that are
-nearly normal, so a block takes part once it is `resolved`: as in a χ² test, what is too uncertain
+nearly normal, so a block takes part once it is resolved: as in a χ² test, what is too uncertain
 by itself is judged together with its neighbours.
 """
 
@@ -53,6 +53,8 @@ class ImageTest:
     ----------
     pixels
         How many pixels were counted.
+    resolved
+        Whether they have samples enough to tell their own errors.
     mean, reference
         Their mean in both images.
     standard_error
@@ -64,6 +66,7 @@ class ImageTest:
     """
 
     pixels: int
+    resolved: bool
     mean: Floats
     reference: Floats
     standard_error: Floats
@@ -77,8 +80,8 @@ class ImageTest:
 
     @property
     def passed(self) -> bool:
-        """Whether the difference can be chance."""
-        return self.p_value >= SIGNIFICANCE
+        """Whether the difference can be chance; it is not known if it is not resolved."""
+        return not self.resolved or self.p_value >= SIGNIFICANCE
 
 
 class Block(NamedTuple):
@@ -164,6 +167,7 @@ def compare(
     *,
     edges: NDArray[np.bool_] | None = None,
     tolerance: float = 0.0,
+    min_samples: int = 0,
 ) -> Comparison:
     """Test whether an image has the expectation of its reference.
 
@@ -175,9 +179,12 @@ def compare(
         What it should be; taken as exact if it has no passes.
     edges
         Pixels (height, width) to leave out of the images' means, because their noise drowns the
-        rest; by default none. Every pixel counts in the blocks.
+        rest, unless that is black; by default none. Every pixel counts in the blocks.
     tolerance
         Relative error of the reference that is known, and not held against the image.
+    min_samples
+        How many samples a mean must have to be judged: of fewer, too few are of the rarest kind
+        that matters, and it seems more certain than it is.
 
     Raises
     ------
@@ -187,8 +194,10 @@ def compare(
     if image.mean.shape != reference.mean.shape:
         sizes = [f"{e.mean.shape[1]}x{e.mean.shape[0]}" for e in (image, reference)]
         raise ValueError(f"reference: its size is {sizes[1]}, and the image's is {sizes[0]}")
-    kept = np.ones(image.mean.shape[:2], np.bool_) if edges is None else ~edges
-    test = _Welch(image, reference, tolerance)
+    kept = np.ones(image.mean.shape[:2], np.bool_)
+    if edges is not None and reference.mean[~edges].any():
+        kept = ~edges
+    test = _Welch(image, reference, tolerance, min_samples)
     of_image, of_blocks = _test_image(test, kept), _test_blocks(test, kept)
     return Comparison(image, reference, tolerance, of_image, of_blocks)
 
@@ -206,9 +215,12 @@ def of_any(p_value: float, comparisons: int) -> float:
 class _Welch:
     """Welch's t-test of two images, block by block."""
 
-    def __init__(self, image: Estimate, reference: Estimate, tolerance: float) -> None:
+    def __init__(
+        self, image: Estimate, reference: Estimate, tolerance: float, min_samples: int
+    ) -> None:
         self.pair = image, reference
         self.tolerance = tolerance + ROUNDING
+        self.min_samples = min_samples
         passes = [estimate.passes for estimate in self.pair if estimate.passes]
         if image.passes < 2 or min(passes) < 2:
             raise ValueError("image: its errors are unknown; it must have two passes at least")
@@ -219,10 +231,10 @@ class _Welch:
         from scipy import stats
 
         difference = np.abs(image.mean - reference.mean) - self.allowed(reference)
-        error = np.maximum(_standard_error(image, reference), np.finfo(np.float64).tiny)
-        t = np.maximum(difference, 0) / error
-        p_value = 2 * stats.t.sf(t, self.degrees_of_freedom)
-        return np.where(np.isfinite(t), p_value, 0.0)
+        error = _standard_error(image, reference)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            t = np.where(difference <= 0, 0, difference / error)
+        return np.where(np.isnan(t), 0.0, 2 * stats.t.sf(t, self.degrees_of_freedom))
 
     def detectable(self, image: Value, reference: Value, comparisons: int) -> Floats:
         """Differences that n comparisons detect with the probability `POWER`."""
@@ -246,7 +258,8 @@ def _test_image(test: _Welch, kept: NDArray[np.bool_]) -> ImageTest:
     detectable = test.detectable(image, reference, channels)
     error = _standard_error(image, reference)
     pixels = int(kept.sum())
-    return ImageTest(pixels, image.mean, reference.mean, error, p_value, detectable)
+    resolved = pixels * test.pair[0].spp >= test.min_samples
+    return ImageTest(pixels, resolved, image.mean, reference.mean, error, p_value, detectable)
 
 
 def _mean(image: Value) -> Value:
@@ -261,7 +274,8 @@ def _test_blocks(test: _Welch, kept: NDArray[np.bool_]) -> BlockTest:
     pixels = _cautious(*test.pair, kept)
     for side in _sides(height, width):
         image, reference = (_blocks(values, side) for values in pixels)
-        resolved = _resolved(image) & _resolved(reference)
+        resolved = _resolved(image) & (_resolved(reference) | (reference.mean == 0))
+        resolved &= side**2 * test.pair[0].spp >= test.min_samples
         p_value = np.where(resolved, test.p_value(image, reference), 1.0)
         levels.append(_Level(side, image, reference, resolved, p_value))
         np.minimum(p_map, _spread(p_value.min(axis=2), side, p_map.shape), out=p_map)

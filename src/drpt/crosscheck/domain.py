@@ -48,6 +48,9 @@ MIN_SINE = 0.03
 MAX_SINE = 0.99
 """Largest radius / distance that `light_error` covers: 1 % of the radius from the light."""
 
+MAX_OFFSET = 1e-3
+"""Largest offset of Mitsuba's rays, relative to the scene's size, at which it is compared with."""
+
 UNIT = 2.0**-24
 """Largest relative rounding error of float32."""
 ROUNDING = 70 * UNIT
@@ -140,11 +143,32 @@ def caveats(scene: Scene) -> list[Caveat]:
 def tolerance(scene: Scene) -> float:
     """Return a bound of the relative error that its sphere lights cause in Mitsuba's picture.
 
-    See `light_error`; 0 without sphere lights, or with nothing for them to light. It holds for
-    each pixel, for every number of bounces, and for surfaces that keep 1 % of a light's radius
-    away from it.
+    See `light_error`; 0 without sphere lights, or with nothing for them to light, and infinite
+    beyond `MAX_OFFSET`. It holds for each pixel, for every number of bounces, and for surfaces that
+    keep 1 % of a light's radius away from it.
     """
+    if ray_offset(scene) > MAX_OFFSET:
+        return np.inf
     return max((caveat.error for caveat in _sphere_lights(scene)), default=0.0)
+
+
+def ray_offset(scene: Scene) -> float:
+    """Return how far off a surface Mitsuba's rays start at the most, relative to the scene's size.
+
+    They start 1500 u (1 + max|p|) off a point p (``RayEpsilon`` in ``math.h``, ``offset_p`` in
+    ``interaction.h``). The size is the longest side of the box around all shapes.
+    """
+    low, high = np.transpose([_bounds(shape) for shape in scene.shapes], (1, 0, 2))
+    low, high = low.min(axis=0), high.max(axis=0)
+    reach = max(np.abs(low).max(), np.abs(high).max())
+    return float(1500 * UNIT * (1 + reach) / (high - low).max())
+
+
+def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    if isinstance(shape, Sphere):
+        center = np.array(shape.center)
+        return center - shape.radius, center + shape.radius
+    return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
 
 
 def _sphere_lights(scene: Scene) -> list[Caveat]:

@@ -7,7 +7,7 @@ import re
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from os import PathLike
 
     from numpy.typing import NDArray
+
+_Value = TypeVar("_Value")
 
 THROWN_AT = re.compile(r"\[\w+\.cpp:\d+\] (?:Error while loading )?")
 """How Mitsuba's messages begin."""
@@ -66,6 +68,28 @@ class Element:
         """Return a property, a plain value of Mitsuba's, or `default` if it is not there."""
         return self.node.props.get(name, default)
 
+    def number(self, name: str, default: float) -> float:
+        """Return a property that is a number; raise `SceneError` if it is something else."""
+        return self._typed(name, default, (int, float), "a number")
+
+    def whole(self, name: str, default: int) -> int:
+        """Return a property that is a whole number; raise `SceneError` if it is not."""
+        return self._typed(name, default, (int,), "a whole number")
+
+    def flag(self, name: str) -> bool:
+        """Return a property that is true or false, which is its default; or raise `SceneError`."""
+        return self._typed(name, False, (bool,), "true or false")
+
+    def text(self, name: str, default: str) -> str:
+        """Return a property that is a text; raise `SceneError` if it is something else."""
+        return self._typed(name, default, (str,), "a text")
+
+    def _typed(self, name: str, default: _Value, kinds: tuple[type, ...], words: str) -> _Value:
+        value: _Value = self.get(name, default)
+        if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+            raise self.refuse(f"its {name} is {value!r}; it must be {words}")
+        return value
+
     def matrix(self) -> NDArray[np.float64]:
         """Return ``to_world`` as a matrix (4, 4)."""
         transform = self.get("to_world", None)
@@ -93,9 +117,18 @@ class Element:
 
     def first(self, kind: str) -> Element | None:
         """Return its first element of a kind."""
+        return next(iter(self._of(kind)), None)
+
+    def only(self, kind: str) -> Element | None:
+        """Return its element of a kind; raise `SceneError` if there are several."""
+        found = self._of(kind)
+        if len(found) > 1:
+            raise self.refuse(f"it has {len(found)} elements <{kind}>; it must have one")
+        return next(iter(found), None)
+
+    def _of(self, kind: str) -> list[Element]:
         children = self.children().values()
-        elements = (child for child in children if isinstance(child, Element))
-        return next((element for element in elements if element.kind == kind), None)
+        return [child for child in children if isinstance(child, Element) and child.kind == kind]
 
     def allow(self, *names: str) -> None:
         """Raise `SceneError` if it has a plain property that is not one of `names`."""

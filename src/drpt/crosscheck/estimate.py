@@ -10,6 +10,7 @@ import numpy as np
 from drpt.crosscheck.convert import to_mitsuba
 from drpt.crosscheck.variant import scoped_variant
 from drpt.film import Film
+from drpt.kernel import backend
 from drpt.render import Mode, Rendering
 
 if TYPE_CHECKING:
@@ -118,11 +119,13 @@ def reference(
     """
     per_pass = check_spp(spp) // PASSES
     with scoped_variant() as mi:
-        copy = to_mitsuba(scene, bounces)
+        with backend.interrupts_put_off():
+            copy = to_mitsuba(scene, bounces)
         shares = [min(FILM_SPP, per_pass - first) for first in range(0, per_pass, FILM_SPP)]
 
         def render(spp: int, word: int) -> NDArray[np.float64]:
-            image: Any = mi.render(copy, spp=spp, seed=mi.UInt32(int(word)))
+            with backend.interrupts_put_off():
+                image: Any = mi.render(copy, spp=spp, seed=mi.UInt32(int(word)))
             return np.array(image, np.float64).reshape(-1, 3) * spp
 
         def sums() -> Iterator[NDArray[np.float64]]:

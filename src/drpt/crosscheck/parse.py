@@ -148,7 +148,7 @@ def _mesh(element: Element) -> MeshArrays:
     """Return a mesh in the world, as Mitsuba makes it; what it does not show is made here."""
     corners = {"rectangle": SQUARE, "disk": disk()}.get(element.type)
     if corners is not None:
-        return polygon(corners, element.matrix(), element.get("flip_normals", False))
+        return polygon(corners, element.matrix(), element.flag("flip_normals"))
     mi = element.mi
     properties = mi.Properties(element.type)
     for name in PROPERTIES[element.type]:
@@ -162,8 +162,8 @@ def _sphere(element: Element, shown: Surface) -> Sphere:
     scale = uniform_scale(to_world[:3, :3])
     if scale is None:
         raise SceneError("its to_world makes it an ellipsoid; it must scale all directions alike")
-    inward = element.get("flip_normals", False) != (np.linalg.det(to_world[:3, :3]) < 0)
+    inward = element.flag("flip_normals") != (np.linalg.det(to_world[:3, :3]) < 0)
     if inward and shown.is_light:
         raise SceneError("it emits inward; a sphere of drpt's emits outward")
     center = to_world @ [*element.get("center", (0, 0, 0)), 1]
-    return Sphere(center[:3], scale * element.get("radius", 1.0), **shown.parameters())
+    return Sphere(center[:3], scale * element.number("radius", 1.0), **shown.parameters())

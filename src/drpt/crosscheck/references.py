@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from drpt.crosscheck.domain import caveats, tolerance
+from drpt.crosscheck.domain import MAX_OFFSET, caveats, ray_offset, tolerance
 from drpt.crosscheck.estimate import Estimate, check_spp, reference
-from drpt.crosscheck.stored import load_estimate
+from drpt.crosscheck.stored import load_estimate, whole
 from drpt.crosscheck.variant import VARIANT
 from drpt.render import Rendering
 from drpt.scene import Mesh, Scene
@@ -21,7 +21,13 @@ if TYPE_CHECKING:
 
 SPP = 1024
 """Samples per pixel of a reference and of what is checked, if nothing else is asked for."""
+BOUNCES = 3
+"""Bounces, if nothing else is asked for or told."""
 MITSUBA = "Mitsuba"
+OFFSET = (
+    "coordinates: Mitsuba's rays start up to {} of the scene's size off their surfaces, so its "
+    "picture may be anything; scale the scene to 1 or more, and move it to the origin"
+)
 NORMALS = (
     "interpolated normals: Mitsuba looks at shading normals alone, drpt at both, so their pictures "
     "differ where the two disagree on the side of a direction"
@@ -64,7 +70,7 @@ class Reference:
 def render_reference(
     scene: Scene,
     spp: int = SPP,
-    bounces: int = 3,
+    bounces: int = BOUNCES,
     seed: int = 0,
     *,
     on_pass: OnPass = lambda passes: None,
@@ -98,11 +104,14 @@ def stored_reference(
         The file is unreadable, has the wrong shape or, it says, another number of bounces.
     """
     estimate, metadata = load_estimate(path)
-    stored = metadata.get("bounces")
-    if bounces is None:
-        bounces = 3 if stored is None else int(stored)
-    if stored not in (None, bounces):
-        raise ValueError(f"bounces: {bounces} is not allowed; it must be {stored}, as in {path}")
+    if "bounces" in metadata:
+        stored = whole(metadata, path, "bounces", low=0)
+        if bounces not in (None, stored):
+            words = f"it must be {stored}, as in {path}"
+            raise ValueError(f"bounces: {bounces} is not allowed; {words}")
+        bounces = stored
+    bounces = BOUNCES if bounces is None else bounces
+    Rendering(scene, bounces=bounces)  # refuses what is not allowed
     scene = _resized(scene, estimate, path)
     remarks = () if estimate.passes else (f"{path} tells no variances: it is taken as exact",)
     if metadata.get("scene") not in (None, to_toml(scene)):
@@ -125,5 +134,9 @@ def _resized(scene: Scene, estimate: Estimate, path: str | PathLike[str]) -> Sce
 
 
 def _remarks(scene: Scene) -> tuple[str, ...]:
+    offset = ray_offset(scene)
     shades = any(isinstance(s, Mesh) and s.normals is not None and s.material for s in scene.shapes)
-    return (*map(str, caveats(scene)), *([NORMALS] if shades else []))
+    remarks = [str(caveat) for caveat in caveats(scene)]
+    if offset > MAX_OFFSET:
+        remarks.append(OFFSET.format(f"{100 * offset:.2g} %"))
+    return tuple(remarks + [NORMALS] * shades)

@@ -48,7 +48,7 @@ def surface(shape: Element) -> Surface:
     for child in shape.elements():
         if child.kind not in ("bsdf", "emitter"):
             raise child.refuse("drpt has nothing like it; a shape may have a bsdf and an emitter")
-    bsdf, emitter = shape.first("bsdf"), shape.first("emitter")
+    bsdf, emitter = shape.only("bsdf"), shape.only("emitter")
     emits = _radiance(emitter) if emitter else (0.0, 0.0, 0.0)
     if bsdf is None:
         return Surface(Diffuse(0 if emitter else 0.5), two_sided=False, emits=emits)

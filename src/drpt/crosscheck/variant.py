@@ -30,8 +30,9 @@ def load_mitsuba() -> Any:
     variant = mi.variant() or VARIANT
     if not variant.endswith("_rgb"):
         raise ValueError(f"Mitsuba's variant: {variant!r} is not allowed; it must end in '_rgb'")
-    mi.set_variant(variant)
-    _register(variant)
+    with backend.interrupts_put_off():
+        mi.set_variant(variant)
+        _register(variant)
     return mi
 
 
@@ -40,7 +41,8 @@ def scoped_variant() -> Iterator[Any]:
     """Mitsuba in `VARIANT`; the one that was set before is set again afterwards."""
     mi = _import_mitsuba()
     previous = mi.variant()
-    mi.set_variant(VARIANT)
+    with backend.interrupts_put_off():
+        mi.set_variant(VARIANT)
     try:
         yield load_mitsuba()
     finally:
@@ -50,7 +52,8 @@ def scoped_variant() -> Iterator[Any]:
 
 def _import_mitsuba() -> Any:
     backend.load("llvm")  # first, or Mitsuba chooses another library
-    import mitsuba as mi
+    with backend.interrupts_put_off():
+        import mitsuba as mi
 
     return mi
 

@@ -39,6 +39,8 @@ def to_mitsuba_xml(scene: Scene, path: str | PathLike[str], bounces: int = 3) ->
     """
     if not isinstance(path, str | os.PathLike) or not Path(path).name:
         raise checks.refuse("", path, "the path of an XML file")
+    if "$" in Path(path).name:
+        raise SceneError("its name holds a $, which Mitsuba takes for a parameter", "", str(path))
     for index, shape in enumerate(scene.shapes):
         if isinstance(shape.material, Phong):
             raise SceneError(
