@@ -24,7 +24,7 @@ TELLING = 0.01
 """Difference of the means, relative, that a check must be able to detect to say "pass"."""
 MIN_EVENTS = 1000
 """Samples of the rarest kind that matters: fewer do not tell how much they vary."""
-UNIFORM = "uniform directions meet sharp lobes too seldom to tell how uncertain the picture is"
+RARE = "the samples that meet sharp lobes are too few to tell how much they vary"
 
 
 class Verdict(StrEnum):
@@ -78,7 +78,7 @@ class Report:
         if self.flip is not None:
             lines.append(f"  FLIP     {self.flip:.4f}")
         if not test.resolved:
-            lines.append(f"  {UNIFORM}")
+            lines.append(f"  {RARE}")
         spp = self.comparison.image.spp
         return "\n".join([f"{self.mode}, {self.sampler}, {spp} spp: {self.verdict}", *lines])
 
@@ -151,13 +151,14 @@ def check(
 def samples_needed(scene: Scene, bounces: int, mode: Mode) -> int:
     """How many samples must have been drawn to tell how much they vary, if that matters.
 
-    Of uniform directions, one in α + 1 meets a lobe of exponent α, and weighs as much; of k of them
-    one after the other, one in (α + 1)^k. Directions by the BRDF know nothing of the kind.
+    Of directions that know nothing of a lobe of exponent α, as few as one in α + 1 meet it, and
+    those weigh as much; of k of them one after the other, one in (α + 1)^k. Such are the directions
+    to sampled points of lights, where no MIS weighs them, and uniform ones.
     """
     lobes = [s.material.exponent for s in scene.shapes if isinstance(s.material, Phong)]
-    if mode.samples_brdf or not lobes:
+    if not lobes or mode in (Mode.IMPLICIT, Mode.MIS):
         return 0
-    choices = bounces if mode.counts_hits else max(bounces - 1, 0)
+    choices = min(bounces, 1) if mode.samples_brdf else bounces
     return int(MIN_EVENTS * (int(max(lobes)) + 1) ** choices)
 
 

@@ -84,7 +84,7 @@ class Element:
         """Return a property that is a text; raise `SceneError` if it is something else."""
         return self._typed(name, default, (str,), "a text")
 
-    def _typed(self, name: str, default: _Value, kinds: tuple[type, ...], words: str) -> _Value:
+    def _typed(self, name: str, default: _Value, kinds: Any, words: str) -> _Value:
         value: _Value = self.get(name, default)
         if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
             raise self.refuse(f"its {name} is {value!r}; it must be {words}")
