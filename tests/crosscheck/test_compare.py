@@ -126,8 +126,10 @@ def test_opposite_errors_show_in_the_blocks() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_is_not_finite_fails(value: float) -> None:
-    wrong = compare(with_mean(normal(0), (0, 0, 0), value), normal(1))
+    wrong = compare(with_mean(normal(0), (0, 0, 0), value), normal(1), min_samples=10**6)
     assert wrong.of_image.p_value == wrong.of_blocks.p_value == 0
+    assert not wrong.of_image.passed
+    assert not wrong.of_blocks.passed
 
 
 def test_a_missing_light_fails() -> None:

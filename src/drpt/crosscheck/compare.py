@@ -226,6 +226,10 @@ class _Welch:
             raise ValueError("image: its errors are unknown; it must have two passes at least")
         self.degrees_of_freedom = min(passes) - 1
 
+    def has_samples(self, pixels: int) -> bool:
+        """Whether so many pixels of the image have samples enough to be judged."""
+        return pixels * self.pair[0].spp >= self.min_samples
+
     def p_value(self, image: Value, reference: Value) -> Floats:
         """Two-sided p-values of values that should be equal; 0 where one is not finite."""
         from scipy import stats
@@ -258,7 +262,7 @@ def _test_image(test: _Welch, kept: NDArray[np.bool_]) -> ImageTest:
     detectable = test.detectable(image, reference, channels)
     error = _standard_error(image, reference)
     pixels = int(kept.sum())
-    resolved = pixels * test.pair[0].spp >= test.min_samples
+    resolved = bool((test.has_samples(pixels) | ~np.isfinite(image.mean)).any())
     return ImageTest(pixels, resolved, image.mean, reference.mean, error, p_value, detectable)
 
 
@@ -275,7 +279,7 @@ def _test_blocks(test: _Welch, kept: NDArray[np.bool_]) -> BlockTest:
     for side in _sides(height, width):
         image, reference = (_blocks(values, side) for values in pixels)
         resolved = _resolved(image) & (_resolved(reference) | (reference.mean == 0))
-        resolved &= side**2 * test.pair[0].spp >= test.min_samples
+        resolved &= test.has_samples(side**2) | ~np.isfinite(image.mean)
         p_value = np.where(resolved, test.p_value(image, reference), 1.0)
         levels.append(_Level(side, image, reference, resolved, p_value))
         np.minimum(p_map, _spread(p_value.min(axis=2), side, p_map.shape), out=p_map)
@@ -335,9 +339,8 @@ def _cautious(image: Estimate, reference: Estimate, kept: NDArray[np.bool_]) -> 
     """
     shares = reference.spp / image.spp * reference.variance[kept].mean(axis=0)
     floor = np.maximum(image.variance[kept].mean(axis=0) - shares, 0)
-    return Value(image.mean, np.maximum(_smooth(image.variance), floor)), Value(
-        reference.mean, _smooth(reference.variance)
-    )
+    ours = Value(image.mean, np.maximum(_smooth(image.variance), floor))
+    return ours, Value(reference.mean, _smooth(reference.variance))
 
 
 def _smooth(variance: Floats) -> Floats:
