@@ -2,7 +2,7 @@
 BIN := .venv/bin
 STAMP := .venv/.stamp
 
-.PHONY: demo test test-quick lint format references lock clean
+.PHONY: demo test test-quick lint format references stress lock clean
 
 demo: $(STAMP)  ## render the Cornell box
 	@mkdir -p out
@@ -26,6 +26,9 @@ format: $(STAMP)  ## let ruff write the code's format
 
 references: $(STAMP)  ## make Mitsuba's pictures in reference/ again, a quarter of an hour
 	$(BIN)/python -m reference.make
+
+stress: $(STAMP)  ## numbers at the edges: a table of errors and bounds; fails where one is exceeded
+	$(BIN)/python -m benchmarks.stress
 
 lock:  ## take the newest versions that pyproject.toml allows
 	@tools/lock.sh
