@@ -142,7 +142,7 @@ def closed_room(name: str, shape: Callable[[Floats, float], Mesh]) -> Case:
         name=f"closed room, {name}",
         parameter="offset in sizes",
         values=OFFSETS,
-        quick=(0.1,),
+        quick=(0.1, 1e3),
         error=leaks(_sample_in_drpt, shape),
         mitsuba=leaks(_sample_in_mitsuba, shape),
         bound=0,

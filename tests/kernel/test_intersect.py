@@ -544,3 +544,32 @@ def test_the_self_hit_gate_sees_points_below_the_surface() -> None:
     normal = sample_uniform_sphere(rng, 1000)
     again = world.closest(center + (1 - 1e-6) * normal, grazing(rng, normal))
     assert (again.valid & (again.shape == 0)).any()
+
+
+@pytest.mark.parametrize("radius", [1e2, 1e4, 1e6])
+def test_a_large_sphere_is_as_exact_as_what_stands_on_it(radius: float) -> None:
+    """Its hits lie just above it, by an error of what is near, and see nothing of it again."""
+    rng = np.random.default_rng(0)
+    n = 50_000
+    ground = drpt.Sphere((0, 0, -radius), radius, material=dull(0))
+    world = World(ground, drpt.Sphere((0, 0, 1), 1, radiance=1))
+    targets = rng.uniform(-5, 5, (n, 3)) * [1, 1, 0]
+    origins = targets + 4 * np.abs(sample_uniform_sphere(rng, n)) + [0, 0, 0.1]
+    found = world.closest(origins, normalize(targets - origins))
+    start = found.valid & (found.shape == 0)
+    assert start.mean() > 0.8
+    point, normal = found.point[start], found.normal[start]
+    height = (dot(point, point) / radius + 2 * point[:, 2]) / 2
+    assert (height > 0).all()
+    assert height.max() < 10 * OFFSET
+    again = world.closest(point, grazing(rng, normal))
+    assert not (again.valid & (again.shape == 0)).any()
+
+
+def test_only_a_sphere_near_the_origin_is_large() -> None:
+    def balls(*shapes: Shape) -> list[bool]:
+        return [ball.power is not None for ball in World(*shapes).scene.balls]
+
+    light = drpt.Sphere((0, 0, 1), 1, radiance=1)
+    assert balls(drpt.Sphere((0, 0, -1e5), 1e5, material=dull(0)), light)[0]
+    assert not balls(drpt.Sphere((0, 0, -5), 1, material=dull(0)), light)[0]

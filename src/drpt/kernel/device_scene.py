@@ -20,13 +20,21 @@ if TYPE_CHECKING:
     from drpt.kernel.facets import Facet
     from drpt.kernel.primitives import Primitives
 
+LARGE = 1 / 16
+"""A sphere is large if the origin is no farther from its surface, relative to its radius."""
+
 
 @dataclass
 class Ball:
-    """A sphere whose centre and radius are inputs of the kernel, the same for all lanes."""
+    """A sphere whose centre and radius are inputs of the kernel, the same for all lanes.
+
+    One that is large against its distance from the origin, such as the ground, also has the
+    ``power`` of the origin, |c|² − r²: there the difference would lose all of its digits.
+    """
 
     center: Array3f
     radius: Float
+    power: Float | None = None
 
 
 @dataclass
@@ -143,4 +151,7 @@ def _own_copy(mapped: Float) -> Float:
 
 def _ball(row: NDArray[np.float64], types: ModuleType) -> Ball:
     x, y, z, radius = (dr.opaque(types.Float32, float(value)) for value in row)
-    return Ball(types.Array3f(x, y, z), radius)
+    distance = np.linalg.norm(row[:3])
+    large = abs(distance - row[3]) < LARGE * row[3]
+    power = float((distance - row[3]) * (distance + row[3]))
+    return Ball(types.Array3f(x, y, z), radius, dr.opaque(types.Float32, power) if large else None)

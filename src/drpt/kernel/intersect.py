@@ -24,7 +24,9 @@ SPAWN_OFFSET = 2.0**-20
 
 A hit point that was projected back onto its surface, and the test against the same surface, are
 together off by about ten half ulps at the most (Wächter & Binder 2019, Ray Tracing Gems, ch. 6).
-For a triangle of a mesh, whose test starts from its corners, those are coordinates, too.
+For a triangle of a mesh, whose test starts from its corners, those are coordinates, too. From a
+polygon it starts as far again back along the ray that has come: in a corner, a point that was
+rounded to behind the other wall returns to where that ray was.
 """
 COINCIDENT = 2.0**-20
 """Up to which difference surfaces are one, relative to the coordinates and the distance to them.
@@ -37,8 +39,8 @@ shaded by it. The back of a light hides nothing. Of two such lights the later on
 class Hit(NamedTuple):
     """Where a ray meets a surface.
 
-    ``point`` lies off the surface by its rounding error, on the side that the ray comes from, and
-    both unit normals face that side. ``front`` tells whether it is the side that emits: outside
+    ``point`` lies off the surface by its rounding error, towards where the ray comes from, and both
+    unit normals face that side. ``front`` tells whether it is the side that emits: outside
     of a sphere, the counter-clockwise side of a triangle.
     """
 
@@ -174,19 +176,27 @@ def _meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
     """First meeting with a sphere beyond the origin, the ray's direction being a unit vector.
 
     Source: Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection" (Ray Tracing
-    Gems, ch. 7).
+    Gems, ch. 7). Rays that start near a large sphere are told by the power of their origin instead.
     """
     f = ray.origin - ball.center
     b = -dr.dot(f, ray.direction)
-    closest = dr.fma(ray.direction, b, f)
-    r2 = ball.radius * ball.radius
-    discriminant = r2 - dr.dot(closest, closest)
+    if ball.power is None:
+        closest = dr.fma(ray.direction, b, f)
+        r2 = ball.radius * ball.radius
+        c, discriminant = dr.dot(f, f) - r2, r2 - dr.dot(closest, closest)
+    else:
+        c = _power(ball, ball.power, ray.origin)
+        discriminant = dr.fma(b, b, -c)
     root: Any = dr.copysign(dr.sqrt(discriminant), b)
     q = b + root
-    c = dr.dot(f, f) - r2
     other = c / q
     near, far = dr.minimum(q, other), dr.maximum(q, other)
     return (discriminant > 0) & (far > 0), dr.select(near > 0, near, far)
+
+
+def _power(ball: Ball, of_origin: Float, p: Array3f) -> Float:
+    """The power |p − c|² − r² of a point, from that of the origin."""
+    return dr.dot(p, p) - 2 * dr.dot(p, ball.center) + of_origin
 
 
 def _surface(
@@ -203,7 +213,8 @@ def _surface(
     if scene.reach is not None:
         in_mesh = valid & (primitive < scene.first_sphere)
         reach = dr.maximum(reach, dr.gather(type(t), scene.reach, primitive, in_mesh))
-    spawn = dr.fma(facing, SPAWN_OFFSET * reach, point)
+    away = _away(scene, features, facing, ray.direction, primitive)
+    spawn = dr.fma(away, SPAWN_OFFSET * reach, point)
     return Hit(valid, t, primitive, spawn, facing, shading_normal, front)
 
 
@@ -211,18 +222,40 @@ _Place: TypeAlias = "tuple[Array3f, Array3f, Float]"
 """A point moved onto its primitive, the normal there, and the largest coordinate in use."""
 
 
+def _away(
+    scene: DeviceScene, features: Features, facing: Array3f, direction: Array3f, primitive: UInt32
+) -> Array3f:
+    """Where to step off what a ray in a direction has hit: see `SPAWN_OFFSET`."""
+    if not features.triangles:
+        return facing
+    if not _some_spheres_reflect(scene, features):
+        return facing - direction
+    return dr.select(_is_sphere(scene, primitive), facing, facing - direction)
+
+
+def _some_spheres_reflect(scene: DeviceScene, features: Features) -> bool:
+    return features.spheres and scene.first_light > scene.first_sphere
+
+
+def _is_sphere(scene: DeviceScene, primitive: UInt32) -> Bool:
+    end = scene.first_sphere + scene.sphere_count
+    return (primitive >= scene.first_sphere) & (primitive < end)
+
+
 def _on_primitive(
     scene: DeviceScene, features: Features, row: Array4f, p: Array3f, primitive: UInt32
 ) -> _Place:
     if not features.spheres:
         return _on_facet(row, p)
-    only_lights = scene.first_light == scene.first_sphere
-    on_sphere = _on_sphere_light(row, p) if only_lights else _on_sphere(row, p)
+    reflect = _some_spheres_reflect(scene, features)
+    on_sphere = _on_sphere(row, p) if reflect else _on_sphere_light(row, p)
+    for number, ball in enumerate(scene.balls, start=scene.first_sphere):
+        if ball.power is not None:
+            on_ball = _on_large_sphere(ball, ball.power, p)
+            on_sphere = dr.select(primitive == number, on_ball, on_sphere)
     if not features.triangles:
         return on_sphere
-    end = scene.first_sphere + scene.sphere_count
-    is_sphere = (primitive >= scene.first_sphere) & (primitive < end)
-    return dr.select(is_sphere, on_sphere, _on_facet(row, p))
+    return dr.select(_is_sphere(scene, primitive), on_sphere, _on_facet(row, p))
 
 
 def _on_facet(row: Array4f, p: Array3f) -> _Place:
@@ -236,6 +269,13 @@ def _on_sphere(row: Array4f, p: Array3f) -> _Place:
     normal = dr.normalize(p - center)
     point = dr.fma(normal, radius, center)
     return point, normal, _largest(point) + radius
+
+
+def _on_large_sphere(ball: Ball, power: Float, p: Array3f) -> _Place:
+    """As on a sphere, but with an error relative to p instead of the radius."""
+    normal = dr.normalize(p - ball.center)
+    point = dr.fma(normal, -_power(ball, power, p) / (2 * ball.radius), p)
+    return point, normal, _largest(point)
 
 
 def _on_sphere_light(row: Array4f, p: Array3f) -> _Place:

@@ -95,7 +95,8 @@ class _Cap(NamedTuple):
     """The part of a sphere light that a point sees: axis, distance, radius and cap height.
 
     The height is 1 − cos θ_max on the unit sphere of directions, 0 from inside, where the light
-    is dark.
+    is dark. The power of the point, d² − r², is summed up without the rounding of d: close to the
+    light it decides how much of its horizon is seen.
     """
 
     axis: Array3f
@@ -111,8 +112,10 @@ def _cap(scene: DeviceScene, point: Array3f, light: UInt32) -> _Cap:
     distance = dr.norm(to_center)
     scale = dr.rcp(distance)
     sine = radius * scale
-    cosine = dr.sqrt((distance - radius) * (distance + radius)) * scale
-    height = dr.select(distance > radius, sine * sine / (1 + cosine), 0)
+    power = dr.fma(to_center.x, to_center.x, -radius * radius)
+    power = dr.fma(to_center.z, to_center.z, dr.fma(to_center.y, to_center.y, power))
+    cosine = dr.sqrt(power) * scale
+    height = dr.select(power > 0, sine * sine / (1 + cosine), 0)
     return _Cap(to_center * scale, distance, radius, height)
 
 
