@@ -12,6 +12,7 @@ from benchmarks.stress.harness import Case, row, run
 CASES = [case for cases in AREAS.values() for case in cases]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_case_stays_within_its_bound(case: Case) -> None:
     for point in run(case, quick=True, with_mitsuba=False):

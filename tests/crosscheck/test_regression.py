@@ -24,9 +24,9 @@ FOLDER = Path("out/regression")
 MEGABYTES = 4
 FRESH = [
     ("cornell-box", 2, Mode.EXPLICIT),
-    ("cornell-box-glossy", 3, Mode.MIS),
+    pytest.param("cornell-box-glossy", 3, Mode.MIS, marks=pytest.mark.slow),
     ("furnace", 3, Mode.IMPLICIT),
-    ("veach", 1, Mode.MIS),
+    pytest.param("veach", 1, Mode.MIS, marks=pytest.mark.slow),
 ]
 
 STORED = [(name, bounces) for name in builtin_names() for bounces in BOUNCES]
