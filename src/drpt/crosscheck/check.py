@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -162,6 +163,7 @@ def samples_needed(scene: Scene, bounces: int, mode: Mode) -> int:
     return int(MIN_EVENTS * (int(max(lobes)) + 1) ** choices)
 
 
+@lru_cache(maxsize=1)  # the modes of a check share them
 def light_edges(scene: Scene, spp: int) -> NDArray[np.bool_]:
     """Pixels (height, width) that show the edge of a light, as far as so many samples tell."""
     return np.asarray(measure(scene, spp, 0).variance.max(axis=2) > 0)

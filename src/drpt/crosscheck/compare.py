@@ -151,7 +151,6 @@ class Comparison:
 
     image: Estimate
     reference: Estimate
-    tolerance: float
     of_image: ImageTest
     of_blocks: BlockTest
 
@@ -199,7 +198,7 @@ def compare(
         kept = ~edges
     test = _Welch(image, reference, tolerance, min_samples)
     of_image, of_blocks = _test_image(test, kept), _test_blocks(test, kept)
-    return Comparison(image, reference, tolerance, of_image, of_blocks)
+    return Comparison(image, reference, of_image, of_blocks)
 
 
 def sidak(significance: float, comparisons: int) -> float:

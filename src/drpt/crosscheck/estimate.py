@@ -52,11 +52,6 @@ class Estimate:
     passes: int
     spp: int
 
-    @property
-    def standard_error(self) -> NDArray[np.float64]:
-        """Standard error of each value, (height, width, 3)."""
-        return np.sqrt(self.variance)
-
 
 def measure(
     scene: Scene,
