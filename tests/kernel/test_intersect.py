@@ -72,7 +72,9 @@ class World:
 
     def closest(self, origins: Floats, directions: Floats) -> Found:
         ray = self._ray(origins, directions)
-        hit = closest_hit(self.scene, self.features, ray, self.scene.types.Bool(True))
+        hit = closest_hit(
+            self.scene, self.features, ray, self.scene.types.Bool(True), from_camera=True
+        )
         dr.eval(hit)
         albedos = [shape.material.albedo[0] if shape.material else -1 for shape in self.shapes]
         reflectance = self.primitives.reflectance[:, 0]
@@ -398,8 +400,13 @@ CLOSED = {
 }
 
 
+@pytest.mark.parametrize("as_body", [True, False])
 @pytest.mark.parametrize("name", CLOSED)
-def test_no_ray_leaves_a_closed_mesh_through_its_seams(name: str) -> None:
+def test_no_ray_leaves_a_closed_mesh_through_its_seams(
+    name: str, as_body: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not as_body:
+        monkeypatch.setattr("drpt.kernel.primitives.make_solids", lambda *_: ())
     levels, radius, center = CLOSED[name]
     rng = np.random.default_rng(1)
     mesh = icosphere(levels, np.array(center), radius)

@@ -71,7 +71,7 @@ class Lights:
     def inverse_pdf_of_hits(self, direction: Any, light: int) -> tuple[Floats, Any]:
         """Return 1 / density of rays from the origin, and where they hit that light."""
         ray = Ray(to_device([ORIGIN]), direction)
-        hit = closest_hit(self.scene, self.features, ray, TYPES.Bool([True]))
+        hit = closest_hit(self.scene, self.features, ray, TYPES.Bool([True]), from_camera=True)
         number = TYPES.UInt32([light])
         found = np.array(hit.valid & (hit.primitive == self.scene.first_light + number))
         return to_host(inverse_pdf(self.scene, self.features, ray, number, hit)), found

@@ -12,6 +12,7 @@ from drpt.kernel.mesh import TriangleMesh
 from drpt.kernel.primitives import UNROLL_LIMIT
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import ModuleType
 
     from drjit.auto import Array3f, Array4f, Float, UInt32
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from drpt.kernel.facets import Facet
     from drpt.kernel.primitives import Primitives
+    from drpt.kernel.solids import Solid
 
 LARGE = 1 / 16
 """A sphere is large if the origin is no farther from its surface, relative to its radius."""
@@ -43,11 +45,14 @@ class DeviceScene:
 
     Attributes
     ----------
-    facets, blockers
-        Constants of each facet that reflects, and whether it can cast a shadow.
-    mesh, reach
-        The triangles that reflect, and the largest coordinate of each, where they are too many
-        for facets.
+    solids
+        Convex bodies of the facets that reflect.
+    loose_facets
+        Of the other facets: number, constants, and whether it can cast a shadow.
+    mesh
+        The triangles that reflect, where they are too many for facets.
+    reach
+        Largest coordinate of each facet or triangle, where some are not in a body.
     light_facets, light_mesh
         The same for those that emit.
     balls
@@ -71,8 +76,8 @@ class DeviceScene:
     first_sphere: int
     first_light: int
     sphere_count: int
-    facets: tuple[Facet, ...]
-    blockers: tuple[bool, ...]
+    solids: tuple[Solid, ...]
+    loose_facets: tuple[tuple[int, Facet, bool], ...]
     mesh: TriangleMesh | None
     reach: Float | None
     light_facets: tuple[Facet, ...]
@@ -111,16 +116,18 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     few_spheres = len(primitives.spheres) <= UNROLL_LIMIT
     first = primitives.first_sphere
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
+    solids = primitives.solids()
+    loose = tuple(_loose(primitives, solids))
     return DeviceScene(
         types=types,
         first_smooth=primitives.first_smooth,
         first_sphere=first,
         first_light=primitives.first_light,
         sphere_count=len(primitives.spheres),
-        facets=primitives.facets,
-        blockers=tuple(primitives.blockers()),
+        solids=solids,
+        loose_facets=loose,
         mesh=TriangleMesh(triangles, types) if len(triangles) else None,
-        reach=array(np.abs(triangles).max(axis=(1, 2))) if len(triangles) else None,
+        reach=array(_reach(primitives)) if len(triangles) or loose else None,
         light_facets=primitives.light_facets,
         light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
@@ -136,6 +143,20 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         light_count=len(pmf),
         sphere_lights=primitives.sphere_lights,
     )
+
+
+def _loose(primitives: Primitives, solids: tuple[Solid, ...]) -> Iterator[tuple[int, Facet, bool]]:
+    taken = {number for solid in solids for number in solid.facets}
+    for number, (facet, blocks) in enumerate(
+        zip(primitives.facets, primitives.blockers(), strict=True)
+    ):
+        if number not in taken:
+            yield number, facet, blocks
+
+
+def _reach(primitives: Primitives) -> NDArray[np.float64]:
+    outlines = [*(facet.corners for facet in primitives.facets), *primitives.triangles]
+    return np.array([np.abs(corners).max() for corners in outlines])
 
 
 def _own_copy(mapped: Float) -> Float:

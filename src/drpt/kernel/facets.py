@@ -45,10 +45,7 @@ class Facet(NamedTuple):
 
 def make_facet(corners: Array) -> Facet:
     """Facet of a convex planar polygon with an area; the corners turn counter-clockwise."""
-    area_normal = _area_normal(corners)
-    normal = area_normal / np.linalg.norm(area_normal)
-    normal[np.abs(normal) < COPLANAR] = 0
-    normal /= np.linalg.norm(normal)
+    normal = unit_normal(corners)
     offset = float((corners @ normal).mean())
     return Facet(corners, tuple(normal.tolist()), offset, _slabs(corners, normal))
 
@@ -77,17 +74,17 @@ def merge_coplanar(polygons: Iterable[Array]) -> list[Array]:
         outline: Outline = tuple(map(tuple, polygon.tolist()))
         while (joined := _join_neighbour(outline, outlines, owner)) is not None:
             neighbour, outline = joined
-            for edge in _edges(outlines.pop(neighbour)):
+            for edge in edges(outlines.pop(neighbour)):
                 owner.pop(edge, None)
         outlines[index] = outline
-        owner.update(dict.fromkeys(_edges(outline), index))
+        owner.update(dict.fromkeys(edges(outline), index))
     return [np.array(outline) for outline in outlines.values()]
 
 
 def _join_neighbour(
     outline: Outline, outlines: dict[int, Outline], owner: dict[tuple[Corner, Corner], int]
 ) -> tuple[int, Outline] | None:
-    for start, end in _edges(outline):
+    for start, end in edges(outline):
         neighbour = owner.get((end, start))
         if neighbour is not None:
             union = _union(outlines[neighbour], outline, (start, end))
@@ -103,7 +100,8 @@ def _union(first: Outline, second: Outline, edge: tuple[Corner, Corner]) -> Outl
     return first[i:] + first[:i] + (second[j:] + second[:j])[1:-1]
 
 
-def _edges(outline: Outline) -> Iterator[tuple[Corner, Corner]]:
+def edges(outline: Outline) -> Iterator[tuple[Corner, Corner]]:
+    """Start and end of each edge of an outline."""
     return pairwise((*outline, outline[0]))
 
 
@@ -114,7 +112,7 @@ def _turns(corners: Array) -> Array:
 
 
 def _is_planar_and_convex(corners: Array) -> bool:
-    normal = _area_normal(corners)
+    normal = area_normal(corners)
     if not normal.any():  # two polygons back to back
         return False
     normal = normal / np.linalg.norm(normal)
@@ -131,7 +129,15 @@ def _without_straight_corners(outline: Outline) -> Outline:
     return tuple(corner for corner, turns in zip(outline, turning, strict=True) if turns)
 
 
-def _area_normal(corners: Array) -> Array:
+def unit_normal(corners: Array) -> Array:
+    """Unit normal of a polygon that has an area; what is nearly parallel to an axis is."""
+    normal = area_normal(corners)
+    normal /= np.linalg.norm(normal)
+    normal[np.abs(normal) < COPLANAR] = 0
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def area_normal(corners: Array) -> Array:
     """Normal of a polygon, as long as its area (Newell's method about the first corner)."""
     spokes = corners[1:] - corners[0]
     return np.asarray(np.cross(spokes[:-1], spokes[1:]).sum(axis=0) / 2)

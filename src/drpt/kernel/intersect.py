@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import drjit as dr
 
 from drpt.kernel.device_scene import Ball
-from drpt.kernel.vec import vec3
+from drpt.kernel.vec import types_of, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
     from drpt.kernel.facets import Facet
+    from drpt.kernel.solids import Face, Solid, Span
 
 SPAWN_OFFSET = 2.0**-20
 """How far off its surface a ray starts, relative to the coordinates there: 16 half ulps.
@@ -53,9 +54,16 @@ class Hit(NamedTuple):
     front: Bool
 
 
-def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
-    """The first surface that a ray meets."""
+def closest_hit(
+    scene: DeviceScene, features: Features, ray: Ray, active: Bool, *, from_camera: bool
+) -> Hit:
+    """The first surface that a ray meets, which comes from the camera or from a surface."""
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
+    for solid in scene.solids:
+        number, met, t = _meet_solid(ray, solid, inside=solid.encloses and not from_camera)
+        closer = met & (t < nearest)
+        nearest = dr.select(closer, t, nearest)
+        primitive = dr.select(closer, number, primitive)
     for number, met, t in _surfaces_and_spheres(scene, ray, active):
         closer = met & (t <= nearest)
         nearest = dr.select(closer, t, nearest)
@@ -76,6 +84,9 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
     blocked = scene.types.Bool(False)
     if scene.mesh is not None:
         blocked = scene.mesh.blocks(ray, before, active)
+    for solid in scene.solids:
+        if solid.shading:
+            blocked |= _blocks(ray, solid, before)
     for number, met, t in _surfaces_and_spheres(scene, ray, active, target):
         reflects = isinstance(number, int) and number < scene.first_light
         reach = before if reflects else dr.select(number > target, beyond, before)
@@ -99,7 +110,7 @@ def _surfaces_and_spheres(
     """
     if scene.mesh is not None and target is None:
         yield scene.mesh.closest(ray, active)
-    for number, (facet, blocks) in enumerate(zip(scene.facets, scene.blockers, strict=True)):
+    for number, facet, blocks in scene.loose_facets:
         if blocks or target is None:
             yield number, *_meet_facet(ray, facet)
     for number, ball in enumerate(scene.balls, start=scene.first_sphere):
@@ -143,6 +154,88 @@ def _light_triangles(
         row = scene.geometry_row(found, met)
         front = dr.dot(vec3(row[0], row[1], row[2]), ray.direction) < 0
         yield found, met if target is None else met & (target != found), t, front
+
+
+def _meet_solid(ray: Ray, solid: Solid, *, inside: bool) -> tuple[UInt32, Bool, Float]:
+    """Number of the facet by which a ray enters a convex body, or else leaves it, and where.
+
+    A ray that is known to start ``inside`` leaves even where rounding has put its origin outside.
+    """
+    crossings = [_cross(ray, span) for span in solid.spans]
+    met, t = _surface_of(crossings, inside=inside)
+    number = types_of(t).UInt32(0)
+    for face, at in _faces(crossings):
+        if face.facet is not None:
+            number = dr.select(at == t, face.facet, number)
+    return number, met, t
+
+
+def _blocks(ray: Ray, solid: Solid, distance: Float) -> Bool:
+    """Whether a convex body stands on the first ``distance`` of a ray between two surfaces."""
+    met, t = _surface_of([_cross(ray, span) for span in solid.shading], inside=False)
+    return met & (t < distance)
+
+
+def _surface_of(crossings: list[_Crossing], *, inside: bool) -> tuple[Bool, Float]:
+    """Whether and where a ray enters a convex body by its surface, or else leaves it by that."""
+    leaves = _least(crossing.leaves for crossing in crossings)
+    openings = [at for face, at in _faces(crossings) if face.facet is None]
+    met, t = types_of(leaves).Bool(True), leaves
+    if not inside:
+        enters = _greatest(crossing.enters for crossing in crossings)
+        met = (enters <= leaves) & (leaves > 0)
+        by_surface = _all(enters > 0, (at != enters for at in openings))
+        t = dr.select(by_surface, enters, leaves)
+    return _all(met, (at != t for at in openings)), t
+
+
+class _Crossing(NamedTuple):
+    """Where a ray enters and leaves a span, and where it meets each of its faces."""
+
+    enters: Any
+    leaves: Any
+    faces: list[tuple[Face, Float]]
+
+
+def _cross(ray: Ray, span: Span) -> _Crossing:
+    """The span's crossing; what is not a number, where a ray runs in a plane, compares as False."""
+    rate = dr.rcp(_dot(span.direction, ray.direction))
+    position = _dot(span.direction, ray.origin)
+    upward = rate > 0
+    low, high = (
+        None if face is None else (face, (face.offset - position) * rate)
+        for face in (span.low, span.high)
+    )
+    return _Crossing(
+        enters=dr.select(upward, low[1] if low else -dr.inf, high[1] if high else -dr.inf),
+        leaves=dr.select(upward, high[1] if high else dr.inf, low[1] if low else dr.inf),
+        faces=[end for end in (low, high) if end],
+    )
+
+
+def _faces(crossings: list[_Crossing]) -> Iterator[tuple[Face, Float]]:
+    for crossing in crossings:
+        yield from crossing.faces
+
+
+def _all(first: Bool, others: Iterator[Bool]) -> Bool:
+    for condition in others:
+        first = first & condition
+    return first
+
+
+def _greatest(values: Iterator[Float]) -> Any:
+    found: Any = -dr.inf
+    for x in values:
+        found = dr.select(x > found, x, found)
+    return found
+
+
+def _least(values: Iterator[Float]) -> Any:
+    found: Any = dr.inf
+    for x in values:
+        found = dr.select(x < found, x, found)
+    return found
 
 
 def _meet_facet(ray: Ray, facet: Facet) -> tuple[Bool, Float]:

@@ -105,8 +105,8 @@ class Tracer:
         scene, features = self.scene, self.features
         ray = Ray(path.origin, path.direction)
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
-        hit = closest_hit(scene, features, ray, path.active)
         is_first = isinstance(depth, int) and depth == 0
+        hit = closest_hit(scene, features, ray, path.active, from_camera=is_first)
         if is_first or self.mode.counts_hits:
             weighted = features.mis and not is_first
             emitted = self._emission(ray, hit, path.pdf if weighted else None)

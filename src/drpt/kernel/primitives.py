@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from drpt.kernel.facets import bounds, has_area, make_facet, merge_coplanar
+from drpt.kernel.solids import make_solids
 from drpt.scene import Diffuse, Mesh, Phong, Sphere
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.facets import Facet
+    from drpt.kernel.solids import Solid
     from drpt.scene import Scene, Shape
 
     Array: TypeAlias = NDArray[np.float64]
@@ -115,11 +117,19 @@ class Primitives:
 
     def blockers(self) -> list[bool]:
         """Whether each facet can stand between two points of the scene."""
+        return [not bounds(facet, *self._balls()) for facet in self.facets]
+
+    def solids(self) -> tuple[Solid, ...]:
+        """The convex bodies among the facets."""
+        return make_solids([facet.corners for facet in self.facets], *self._balls())
+
+    def _balls(self) -> tuple[Array, Array]:
+        """Centres (n, 3) and radii (n,) of balls whose convex hull is that of the scene."""
         outlines = [facet.corners for facet in self.facets]
         points = np.concatenate([*outlines, *self.light_corners, self.spheres[:, :3]])
         radii = np.zeros(len(points))
         radii[len(points) - len(self.spheres) :] = self.spheres[:, 3]
-        return [not bounds(facet, points, radii) for facet in self.facets]
+        return points, radii
 
 
 def make_primitives(scene: Scene) -> Primitives:
