@@ -120,7 +120,7 @@ class Picture:
     bounces: int
     mode: str
     sampler: str
-    non_finite: int = 0
+    warning: str | None = None
     seconds: float = 0.5
     rays: int = 4_000_000
     paths: int = 1_000_000
@@ -134,7 +134,7 @@ class FakeRendering:
     """Stands for `Rendering`: keeps what it is called with, and does as the test says."""
 
     on_pass: Callable[[], None] = lambda: None
-    non_finite: int = 0
+    warning: str | None = None
     settings: dict[str, Any] = field(default_factory=dict)
 
     def __call__(self, *args: Any, **kwargs: Any) -> FakeRendering:
@@ -153,7 +153,7 @@ class FakeRendering:
         camera = self.settings["scene"].camera
         settings = {name: self.settings[name] for name in ("spp", "bounces", "mode", "sampler")}
         image = np.full((camera.height, camera.width, 3), 0.25, np.float32)
-        return Picture(image, **settings, non_finite=self.non_finite)
+        return Picture(image, **settings, warning=self.warning)
 
 
 @pytest.fixture(autouse=True)
@@ -360,11 +360,11 @@ class TestRender:
     def test_quiet_says_nothing_but_warnings(
         self, fake: FakeRendering, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        fake.non_finite = 12
+        fake.warning = "12 of 64 samples were not finite"
         assert cli.render_main(["good.toml", "--quiet"]) == 0
         printed, complaint = capsys.readouterr()
         assert printed == ""
-        assert complaint == "drpt-render: warning: 12 samples were not finite\n"
+        assert complaint == "drpt-render: warning: 12 of 64 samples were not finite\n"
 
     def test_a_full_disk_is_a_failed_run(
         self,

@@ -298,12 +298,73 @@ def test_injected_infinities_are_counted(monkeypatch: pytest.MonkeyPatch) -> Non
         return radiance + bad, rays
 
     monkeypatch.setattr(Tracer, "trace", broken)
-    result = drpt.render(SCENE, 6, 1)
+    with pytest.warns(RuntimeWarning, match="12 of"):
+        result = drpt.render(SCENE, 6, 1)
     assert result.non_finite == 12
     pixels = result.image.reshape(-1, 3)
     assert np.isnan(pixels[5]).all()
     assert np.isposinf(pixels[7]).all()
     assert np.isfinite(np.delete(pixels, [5, 7], axis=0)).all()
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+def test_a_sample_that_is_not_finite_is_named_and_can_be_traced_again(
+    sampler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from drpt.kernel.path import Tracer
+
+    trace = Tracer.trace
+
+    def broken(self: Tracer, ray: Any, sampler: Any) -> Any:
+        import drjit as dr
+
+        radiance, rays = trace(self, ray, sampler)
+        bad = (sampler.pixel == 31) & (sampler.index >= 41)
+        return radiance + dr.select(bad, float("inf"), 0), rays
+
+    monkeypatch.setattr(Tracer, "trace", broken)
+    monkeypatch.setattr(MODULE, "LAUNCH_PATHS", 16 * SCENE.camera.width * SCENE.camera.height)
+    monkeypatch.setattr(MODULE, "LAUNCH_LANES", 4)
+    settings: Any = {"spp": 64, "mode": "explicit", "sampler": sampler, "seed": 3}
+    with pytest.warns(RuntimeWarning, match="not finite") as caught:
+        result = drpt.render(SCENE, **settings)
+    assert str(caught[0].message) == result.warning
+    assert result.warning == (
+        "23 of 6144 samples were not finite, one of them in pixel (7, 2): "
+        f"Rendering(scene, 64, 3, 'explicit', sampler={sampler!r}, seed=3, jitter=True)"
+        ".sample(7, 2, 41) traces it again"
+    )
+    assert result.first_non_finite == (7, 2, 41)
+    assert result.metadata["first_non_finite"] == "7 2 41"
+    rendering = drpt.Rendering(SCENE, **settings)
+    assert np.isposinf(rendering.sample(7, 2, 41)).all()
+    assert np.isfinite(rendering.sample(7, 2, 40)).all()
+
+
+def test_samples_one_by_one_are_those_of_the_picture() -> None:
+    rendering = drpt.Rendering(SCENE, 4, 2)
+    list(rendering.passes())
+    result = rendering.result()
+    assert result.warning is None
+    assert "first_non_finite" not in result.metadata
+    mean = np.mean([rendering.sample(3, 1, n) for n in range(4)], axis=0)
+    assert mean.astype(np.float32) == pytest.approx(result.image[1, 3], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((-1, 0, 0), "column: -1 is not allowed; it must be a whole number from 0 to"),
+        ((0, 10**6, 0), "row: 1000000 is not allowed"),
+        ((0, 0, 4), "number: 4 is not allowed; it must be a whole number from 0 to 3"),
+        ((0, 0.5, 0), "row: 0.5 is not allowed"),
+    ],
+)
+def test_only_samples_of_the_picture_can_be_traced(
+    arguments: tuple[Any, Any, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        drpt.Rendering(SCENE, 4, 2).sample(*arguments)
 
 
 EXPECTED_FEATURES = {

@@ -341,8 +341,8 @@ def _render(args: argparse.Namespace) -> int:
     result = _run(rendering, progress=sys.stderr.isatty() and not args.quiet)
     for path in outputs:
         result.save(path, exposure=args.exposure)
-    if result.non_finite:
-        _say(f"{args.parser.prog}: warning: {result.non_finite} samples were not finite")
+    if result.warning:
+        _say(f"{args.parser.prog}: warning: {result.warning}")
     if not args.quiet:
         print(_summary(result, name), *outputs, sep="\n")
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib.metadata import version
@@ -75,6 +76,9 @@ class Result:
         Rays traced, to vertices and to lights.
     non_finite
         Samples that were infinite or not a number; they are in the image, too.
+    first_non_finite
+        Column, row and number of one of them, if there are any; :meth:`Rendering.sample` traces
+        it again.
     """
 
     image: NDArray[np.float32]
@@ -88,6 +92,20 @@ class Result:
     seconds: float
     rays: int
     non_finite: int
+    first_non_finite: tuple[int, int, int] | None = None
+
+    @property
+    def warning(self) -> str | None:
+        """What is wrong with the picture, and how to see it again; None if nothing is."""
+        if self.first_non_finite is None:
+            return None
+        column, row, sample = self.first_non_finite
+        return (
+            f"{self.non_finite} of {self.paths} samples were not finite, one of them in pixel "
+            f"({column}, {row}): Rendering(scene, {self.spp}, {self.bounces}, {str(self.mode)!r}, "
+            f"sampler={self.sampler!r}, seed={self.seed}, jitter={self.jitter})"
+            f".sample({column}, {row}, {sample}) traces it again"
+        )
 
     @property
     def paths(self) -> int:
@@ -100,8 +118,10 @@ class Result:
         settings = {
             field.name: getattr(self, field.name)
             for field in fields(self)
-            if field.name not in ("image", "scene")
+            if field.name not in ("image", "scene", "first_non_finite")
         }
+        if self.first_non_finite is not None:
+            settings["first_non_finite"] = "{} {} {}".format(*self.first_non_finite)
         versions = {name: version(name) for name in ("drpt", "drjit", "numpy")}
         return {**settings, "mode": str(self.mode), **versions, "scene": to_toml(self.scene)}
 
@@ -146,6 +166,7 @@ class Rendering:
         self._pixels = 0  # that have got those of the pass amid which an interrupt came
         self._rays = 0
         self._non_finite = 0
+        self._first_non_finite: tuple[int, int, int] | None = None
         self._seconds = 0.0
 
     def passes(self) -> Iterator[int]:
@@ -166,11 +187,42 @@ class Rendering:
                 self._film.add(part, sums.radiance, len(samples))
                 self._rays += sums.rays
                 self._non_finite += sums.non_finite
+                if sums.non_finite and self._first_non_finite is None:
+                    bad = ~np.isfinite(sums.radiance).all(axis=1)
+                    pixel = part.start + int(bad.argmax())
+                    self._first_non_finite = self._find_non_finite(launcher, pixel, samples)
                 self._pixels = part.stop
             self._done, self._pixels = samples.stop, 0
             self._seconds += perf_counter() - start
             yield self._done
             start = perf_counter()
+
+    def _find_non_finite(
+        self, launcher: Launcher, pixel: int, samples: range
+    ) -> tuple[int, int, int]:
+        """Column, row and number of the first sample of a pixel that is not finite."""
+        row, column = divmod(pixel, self.scene.camera.width)
+        for start in range(samples.start, samples.stop, LAUNCH_LANES):
+            some = range(start, min(start + LAUNCH_LANES, samples.stop))
+            with backend.interrupts_put_off():
+                finite = np.isfinite(launcher.launch_samples(pixel, some, self.seed)).all(axis=1)
+            if not finite.all():
+                return column, row, start + int(finite.argmin())
+        raise RuntimeError(f"pixel ({column}, {row}) has a sample that is not finite only at times")
+
+    def sample(self, column: int, row: int, number: int) -> NDArray[np.float64]:
+        """Radiance (3,) of one sample of a pixel, the same that the passes trace.
+
+        ``row`` counts from the top, ``number`` from 0; raises `ValueError` for one out of range.
+        """
+        camera = self.scene.camera
+        column = _check_whole("column", column, 0, camera.width - 1)
+        row = _check_whole("row", row, 0, camera.height - 1)
+        number = _check_whole("number", number, 0, self.spp - 1)
+        samples, pixel = range(number, number + 1), row * camera.width + column
+        with backend.interrupts_put_off():
+            radiance = self.launcher().launch_samples(pixel, samples, self.seed)
+        return np.asarray(radiance[0])
 
     def launcher(self) -> Launcher:
         """Put the scene on the device."""
@@ -199,6 +251,7 @@ class Rendering:
             seconds=self._seconds,
             rays=self._rays,
             non_finite=self._non_finite,
+            first_non_finite=self._first_non_finite,
         )
 
 
@@ -235,7 +288,8 @@ def render(
     Returns
     -------
     Result
-        The same call gives the same bits, whatever the number of threads.
+        The same call gives the same bits, whatever the number of threads. Samples that are not
+        finite stay in it, and give a `RuntimeWarning` that says where.
 
     Raises
     ------
@@ -247,7 +301,10 @@ def render(
     rendering = Rendering(scene, spp, bounces, mode, sampler=sampler, seed=seed, jitter=jitter)
     for _ in rendering.passes():
         pass
-    return rendering.result()
+    result = rendering.result()
+    if result.warning:
+        warnings.warn(result.warning, RuntimeWarning, stacklevel=2)
+    return result
 
 
 @dataclass(frozen=True)
@@ -293,7 +350,8 @@ def _check_scene(scene: object) -> Scene:
 
 
 def _check_whole(name: str, value: object, low: int, high: int | None) -> int:
-    allowed = f"a whole number from {low} to {high}" if high else f"a whole number >= {low}"
+    limits = f">= {low}" if high is None else f"from {low} to {high}"
+    allowed = f"a whole number {limits}"
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise _refuse(name, value, allowed)
     if value < low or (high is not None and value > high):

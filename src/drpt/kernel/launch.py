@@ -56,9 +56,14 @@ class Launcher:
         Each pixel takes ``replicates`` lanes that share its samples, each every so manyth. All of
         the arguments are inputs of one and the same kernel.
         """
-        word = _seed_word(seed) + (samples.start >> 32)
-        lanes = self._launch(pixels, samples, replicates, replicates, word)
+        lanes = self._launch(pixels, samples, replicates, replicates, _word_of(seed, samples))
         return lanes._replace(radiance=lanes.radiance.sum(axis=0))
+
+    def launch_samples(self, pixel: int, samples: range, seed: int) -> NDArray[np.float64]:
+        """Radiance (samples, 3) of each sample of a pixel by itself; the same kernel once more."""
+        count, word = len(samples), _word_of(seed, samples)
+        lanes = self._launch(range(pixel, pixel + 1), samples, count, count, word)
+        return lanes.radiance[:, 0]
 
     def launch_passes(self, pixels: range, samples: range, passes: range, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range, once in each independent pass.
@@ -156,6 +161,11 @@ def make_launcher(
 
 def _seed_word(seed: int) -> int:
     return int(np.random.SeedSequence(seed).generate_state(1)[0])
+
+
+def _word_of(seed: int, samples: range) -> int:
+    """What stands for the seed in a sampler, whose index has 32 bits."""
+    return _seed_word(seed) + (samples.start >> 32)
 
 
 def _total(counts: UInt32) -> int:
