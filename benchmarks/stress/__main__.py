@@ -1,6 +1,6 @@
 """Run the stress suite, print a Markdown table, and exit with 1 if any case fails.
 
-python -m benchmarks.stress [AREA ...] [--quick] [--plot FOLDER]
+python -m benchmarks.stress [AREA ...] [--quick | --long] [--plot FOLDER]
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def main() -> int:
     passed = True
     for case in cases:
         points = []
-        for point in run(case, quick=args.quick):
+        for point in run(case, quick=args.quick, long=args.long):
             print(row(point), flush=True)
             points.append(point)
         passed &= all(point.passed for point in points)
@@ -38,7 +38,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "areas", nargs="*", metavar="AREA", help=f"of {', '.join(AREAS)}; all if none is named"
     )
-    parser.add_argument("--quick", action="store_true", help="fewer values and samples")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--quick", action="store_true", help="fewer values and samples")
+    length.add_argument("--long", action="store_true", help="1e9 rays in each closed room")
     parser.add_argument("--plot", metavar="FOLDER", type=Path, help="draw each sweep as a PNG")
     args = parser.parse_args()
     for area in args.areas:

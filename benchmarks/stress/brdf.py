@@ -26,7 +26,7 @@ ERROR = 1e-3
 """Relative, of what is reflected."""
 REASON = "a quarter of a step of 8 bits, and above the noise of the samples"
 EXPONENTS = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
-TILTS = (60.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
+TILTS = (60.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.01)
 """Degrees of a view above the horizon."""
 ALBEDO = 0.9
 VIEW = 0.6

@@ -34,8 +34,9 @@ class Case:
         What the error may be, and why.
     naive
         What naive float32 code does here.
-    samples
-        Samples or rays for each value.
+    samples, long
+        Samples or rays for each value; the same in a long run, where that has more. 0 if they are
+        the parameter.
     mitsuba
         The same error of Mitsuba, where it is cheap to have.
     """
@@ -49,6 +50,7 @@ class Case:
     reason: str
     naive: str
     samples: int = 2**20
+    long: int = 0
     mitsuba: Measure | None = None
 
 
@@ -58,6 +60,7 @@ class Point:
 
     case: Case
     value: float
+    samples: int
     error: float
     mitsuba: float | None
 
@@ -67,15 +70,21 @@ class Point:
         return self.error <= self.case.bound
 
 
-def run(case: Case, *, quick: bool = False, with_mitsuba: bool = True) -> Iterator[Point]:
-    """Measure a case at each of its values."""
-    samples = int(case.samples * QUICK_SHARE) if quick else case.samples
+def run(
+    case: Case, *, quick: bool = False, long: bool = False, with_mitsuba: bool = True
+) -> Iterator[Point]:
+    """Measure a case at each of its values; Mitsuba gets no more samples for a long run."""
+    plain = int(case.samples * QUICK_SHARE) if quick else case.samples
+    samples = max(plain, case.long) if long else plain
     for value in case.quick if quick else case.values:
-        beside = case.mitsuba(value, samples) if with_mitsuba and case.mitsuba else None
-        yield Point(case, value, case.error(value, samples), beside)
+        beside = case.mitsuba(value, plain) if with_mitsuba and case.mitsuba else None
+        yield Point(case, value, samples, case.error(value, samples), beside)
 
 
-HEADER = "| case | parameter | relative error | bound | pass | Mitsuba |\n|---|---|--:|--:|---|--:|"
+HEADER = (
+    "| case | parameter | samples | relative error | bound | pass | Mitsuba |\n"
+    "|---|---|--:|--:|--:|---|--:|"
+)
 
 
 def row(point: Point) -> str:
@@ -83,6 +92,7 @@ def row(point: Point) -> str:
     cells = (
         point.case.name,
         f"{point.case.parameter} = {point.value:g}",
+        f"{point.samples:.1e}" if point.samples else "",
         f"{point.error:.1e}",
         f"{point.case.bound:g}",
         "yes" if point.passed else "**no**",
@@ -111,12 +121,15 @@ def plot(points: list[Point], folder: Path) -> None:
     figure = Figure(figsize=(6, 4), dpi=100, layout="constrained")
     axes = figure.subplots()
     values = [point.value for point in points]
-    beside = [point.mitsuba for point in points]
-    if None not in beside:
-        axes.plot(values, [max(e or 0, FLOOR) for e in beside], "C1s-", ms=4, label="Mitsuba")
-    axes.plot(values, [max(p.error, FLOOR) for p in points], "C0o-", ms=4, label="drpt")
-    axes.axhline(max(case.bound, FLOOR), color="0.3", lw=1, ls="--", label="bound")
-    axes.set(xscale="log", yscale="log", ylim=(FLOOR / 2, None))
+    errors = [max(point.error, FLOOR) for point in points]
+    beside = [max(point.mitsuba, FLOOR) for point in points if point.mitsuba is not None]
+    bound = max(case.bound, FLOOR)
+    if beside:
+        axes.plot(values, beside, "C1s-", ms=4, label="Mitsuba")
+    axes.plot(values, errors, "C0o-", ms=4, label="drpt")
+    axes.axhline(bound, color="0.3", lw=1, ls="--", label="bound")
+    top = 2 * max(*errors, *beside, bound)
+    axes.set(ylim=(FLOOR / 2, top), xscale="log", yscale="log")
     axes.set(xlabel=case.parameter, ylabel="relative error", title=case.name)
     axes.legend(frameon=False)
     name = re.sub(r"[^\w.+]+", "-", case.name)

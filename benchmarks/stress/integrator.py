@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from functools import cache
-from math import isqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from benchmarks.stress.harness import Case
 from benchmarks.stress.intersection import NONE
-from benchmarks.stress.lights import relative
+from benchmarks.stress.lights import UP, relative
 from benchmarks.stress.pictures import camera_at, mean_in_drpt, mean_in_mitsuba
 from benchmarks.stress.world import DULL, NEEDLES, beside, cube, icosphere
-from drpt import Camera, Diffuse, Mesh, Mode, Phong, Scene, Sphere, render
-from drpt.crosscheck import to_mitsuba
-from drpt.crosscheck.variant import load_mitsuba
+from drpt import Camera, Diffuse, Mesh, Mode, Phong, Rendering, Scene, Sphere, render
+from drpt.film import Film
+from drpt.render import LAUNCH_LANES, plan_passes
 from tests.oracle.closed_forms import furnace_radiance
 
 if TYPE_CHECKING:
@@ -27,6 +26,10 @@ if TYPE_CHECKING:
 
 SIDE = 64
 OFFSETS = (0.1, 1.0, 10.0, 1e2, 1e3, 1e4, 1e5)
+BOUNCES = 3
+"""Of paths in a closed room."""
+RAYS = 1_001_000_000
+"""In each closed room, in a long run: over all offsets."""
 
 
 def room(scale: float, radiance: float, *, finely: bool) -> Scene:
@@ -76,17 +79,44 @@ VANISHING = 2.0**-120
 
 
 def of_constant(samples: float, _: int) -> float:
-    """Error of the mean of so many samples of a light of radiance 0.1 that fills the picture."""
+    """Error of the mean of so many samples of a light that fills the pixel; of its rays' count."""
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 1, 1, 1)
     scene = Scene(camera, [Sphere((0, 0, 0), 1, radiance=0.1)])
-    return relative(float(render(scene, int(samples), 0).image[0, 0, 0]), 0.1)
+    result = render(scene, int(samples), 0)
+    return max(relative(float(result.image[0, 0, 0]), 0.1), relative(result.rays, samples))
 
 
-def of_constant_in_mitsuba(samples: float, _: int) -> float:
-    """The same in Mitsuba."""
-    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 1, 1, 1)
-    scene = Scene(camera, [Sphere((0, 0, 0), 1, radiance=0.1)])
-    return relative(mean_in_mitsuba(scene, int(samples) * 256, 0), 0.1)
+def of_passes(samples: float, _: int) -> float:
+    """Error of the film's mean of so many samples of 0.1, in a thousand passes."""
+    film, count = Film(1), int(samples / 1000)
+    for _ in range(1000):
+        film.add(range(1), np.full((1, 3), 0.1 * count), count)
+    return relative(float(film.mean[0, 0]), 0.1)
+
+
+def repeated(samples: float, _: int) -> float:
+    """Share of the passes of one pixel that repeat the sums of another one.
+
+    Of a red, a green and a blue light, which stand in a part of the pixel each, independent samples
+    find the same three numbers twice in 2⁻³⁸ of pairs of passes.
+    """
+    places = {(1, 0, 0): (-0.4, -0.4, 0), (0, 1, 0): (0.4, -0.4, 0), (0, 0, 1): (0, 0.4, 0)}
+    lights = [Sphere(center, 0.4, radiance=colour) for colour, center in places.items()]
+    scene = Scene(Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 20, 1, 1), lights)
+    launcher = Rendering(scene, int(samples), 0, sampler="independent").launcher()
+    passes = [
+        launcher.launch(range(1), part, min(len(part), LAUNCH_LANES), 0).radiance[0]
+        for part in plan_passes(1, int(samples))
+    ]
+    return 1 - len(np.unique(passes, axis=0)) / len(passes)
+
+
+def near_a_light(height: float, samples: int) -> float:
+    """Error of a light of radius 1 that fills the picture of a camera so far above it."""
+    eye = np.array([0.3, -0.5, 0.2]) + (1 + height) * np.array([0.6, 0.48, 0.64])
+    camera = camera_at(eye, (0.3, -0.5, 0.2), fov=60)
+    light = Sphere((0.3, -0.5, 0.2), 1, radiance=0.1)
+    return relative(mean_in_drpt(Scene(camera, [light]), samples, 0), 0.1)
 
 
 def furnace(light_radius: float, radiance: float) -> Scene:
@@ -110,30 +140,28 @@ def in_furnace(
     return error
 
 
-def leaks(picture: Callable[[Scene], Floats], shape: Callable[[Floats, float], Mesh]) -> Measure:
-    """Share of paths in a closed room that see the light outside of it, by the room's offset.
+def leaks(
+    mean: Callable[[Scene, int, int], float], shape: Callable[[Floats, float], Mesh]
+) -> Measure:
+    """Radiance in a closed room, in units of that of a lamp around it, by the room's offset.
 
-    From all vertices of a path a shadow ray leads to the light.
+    All rays that pass a wall see the lamp, and from every vertex a shadow ray leads to it. Each
+    path has `BOUNCES` + 1 rays, and shadow rays.
     """
 
     def error(offset: float, samples: int) -> float:
-        center, light = beside(1, offset)
-        side = isqrt(samples)
-        camera = Camera(
-            np.add(center, (0.1, 0.05, 0.02)), np.add(center, (1, 0, 0)), (0, 0, 1), 120, side, side
-        )
-        return float(picture(Scene(camera, [shape(center, 1), light])).any(axis=2).mean())
+        center, _ = beside(1, offset)
+        camera = camera_at(np.add(center, (0.1, 0.05, 0.02)), np.add(center, (1, 0, 0)), UP, 120)
+        lamp = cube(np.zeros(3), 1.1 * offset + 4)
+        around = Mesh(lamp.vertices, lamp.faces[:, ::-1], radiance=1)
+        scene = Scene(camera, [shape(center, 1), around])
+        return mean(scene, samples // (BOUNCES + 1), BOUNCES)
 
     return error
 
 
-def _sample_in_drpt(scene: Scene) -> Floats:
-    return render(scene, 1, 3, Mode.EXPLICIT).image.astype(np.float64)
-
-
-def _sample_in_mitsuba(scene: Scene) -> Floats:
-    mi = load_mitsuba()
-    return np.asarray(mi.render(to_mitsuba(scene, 3), spp=1).numpy(), np.float64)
+def _with_mis(scene: Scene, samples: int, bounces: int) -> float:
+    return mean_in_drpt(scene, samples, bounces, Mode.MIS)
 
 
 def closed_room(name: str, shape: Callable[[Floats, float], Mesh]) -> Case:
@@ -143,11 +171,13 @@ def closed_room(name: str, shape: Callable[[Floats, float], Mesh]) -> Case:
         parameter="offset in sizes",
         values=OFFSETS,
         quick=(0.1, 1e3),
-        error=leaks(_sample_in_drpt, shape),
-        mitsuba=leaks(_sample_in_mitsuba, shape),
+        error=leaks(_with_mis, shape),
+        mitsuba=leaks(mean_in_mitsuba, shape),
         bound=0,
         reason=NONE,
         naive="rays pass between triangles, and offsets lead through walls in corners",
+        samples=2**22,
+        long=RAYS // len(OFFSETS),
     )
 
 
@@ -193,12 +223,45 @@ CASES = (
     Case(
         name="mean of equal samples",
         parameter="samples",
-        values=(1e2, 1e3, 1e4, 1e5, 1e6, 1e7),
+        values=(1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 2.0**33),
         quick=(1e2, 1e6),
         error=of_constant,
         bound=1e-6,
         reason="a few roundings of float32",
-        naive="a float32 sum of 1e7 samples of 0.1 is off by 9 %",
+        naive="a float32 sum of 1e7 samples of 0.1 is off by 9 %, a count of 32 bits ends at 2³²",
+        samples=0,
+    ),
+    Case(
+        name="mean of equal passes",
+        parameter="samples",
+        values=tuple(2.0**n for n in (20, 24, 32, 33, 40, 48)),
+        quick=(2.0**33, 2.0**48),
+        error=of_passes,
+        bound=1e-14,
+        reason="a few roundings of float64",
+        naive="float32 forgets whatever is 2²⁴ times less than the sum",
+        samples=0,
+    ),
+    Case(
+        name="passes that repeat others",
+        parameter="samples of one pixel",
+        values=tuple(2.0**n for n in (26, 30, 32, 33)),
+        quick=(2.0**28,),
+        error=repeated,
+        bound=0,
+        reason="all of them are to differ",
+        naive="a sample's number of 32 bits begins anew at 2³², and so do the samples",
+        samples=0,
+    ),
+    Case(
+        name="camera close to a light",
+        parameter="distance / radius",
+        values=(0.3, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6),
+        quick=(1e-6,),
+        error=near_a_light,
+        bound=1e-6,
+        reason="a few roundings of float32: all samples are equal",
+        naive="b² - c cancels, and the light is seen from inside",
     ),
     Case(
         name="furnace, explicit, by radiance",
@@ -211,14 +274,21 @@ CASES = (
         naive="squares of radiances overflow or vanish",
     ),
     Case(
+        name="furnace, mis, by bounces",
+        parameter="bounces",
+        values=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 16.0, 32.0),
+        quick=(0.0, 2.0),
+        error=in_furnace(_with_mis, lambda bounces: (0.5, 1.0, int(bounces))),
+        bound=1e-3,
+        reason=NOISE,
+        naive="one bounce more or less than asked for: off by a third at 2 bounces",
+    ),
+    Case(
         name="furnace, mis, by radius of the light",
         parameter="radius of the light / of the furnace",
         values=(1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5),
         quick=(1e-6, 0.5),
-        error=in_furnace(
-            lambda scene, samples, bounces: mean_in_drpt(scene, samples, bounces, Mode.MIS),
-            lambda radius: (radius, 1.0, 3),
-        ),
+        error=in_furnace(_with_mis, lambda radius: (radius, 1.0, 3)),
         bound=1e-3,
         reason=NOISE,
         naive="1 - √(1 - s²) cancels: wrong by 7 % at 1e-3, and black below 1.7e-4",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import acos, atan, cos, fsum, hypot, pi, sin, sqrt
+from math import acos, asin, cos, hypot, pi, sin, sqrt
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import drjit as dr
@@ -19,6 +19,7 @@ from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SobolSampler
 from tests.conftest import TYPES, to_device, to_host
 from tests.oracle.arrays import Floats
+from tests.oracle.closed_forms import sphere_light_irradiance
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +30,7 @@ ERROR = 1e-4
 """Relative, of the irradiance."""
 REASON = "a fortieth of a step of 8 bits, and above the noise of the samples"
 SINES = (0.5, 0.2, 0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
-GAPS = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+GAPS = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 ORIGIN = np.zeros(3)
 UP = np.array([0.0, 0.0, 1.0])
 TILTED = np.array([0.36, 0.48, 0.8])
@@ -42,32 +43,8 @@ Lit: TypeAlias = tuple[Sphere, Floats]
 
 
 def irradiance(sine: float, cosine: float) -> float:
-    """Irradiance of a plane by a sphere light of radiance 1, outside of the sphere.
-
-    Here ``sine`` = sin σ = r/d, and ``cosine`` = cos ω is that of the incidence of its centre.
-    As in `tests.oracle.closed_forms.sphere_light_irradiance`, the light's rim is above the horizon
-    for |t| < t0. With y = tan φ0 = tan σ sin t0 sin ω, its arc and the unit circle's are
-
-        sin²σ cos ω t0 − sin σ cos σ sin ω sin t0 + φ0  =  sin²σ (cos ω t0 + y) + (atan y − y),
-
-    where nothing cancels if atan y − y is taken from its series: small lights keep their digits.
-    """
-    if cosine <= -sine:
-        return 0.0
-    if cosine >= sine:
-        return pi * sine**2 * cosine
-    cot_sigma, sin_omega = sqrt(1 - sine**2) / sine, sqrt(1 - cosine**2)
-    cos_t0 = -cot_sigma * cosine / sin_omega
-    t0 = acos(cos_t0)
-    y = sqrt(1 - cos_t0**2) * sin_omega / cot_sigma
-    return sine**2 * (cosine * t0 + y) + _atan_minus(y)
-
-
-def _atan_minus(y: float) -> float:
-    """Atan y − y."""
-    if y > 0.1:
-        return atan(y) - y
-    return fsum((-1) ** k * y ** (2 * k + 1) / (2 * k + 1) for k in range(1, 9))
+    """Irradiance of a plane by a sphere light of radiance 1: sin σ = r/d, and cos ω."""
+    return sphere_light_irradiance(1, asin(sine), acos(min(cosine, 1)))
 
 
 def relative(found: float, expected: float) -> float:
@@ -169,7 +146,7 @@ def sphere_light(
     )
 
 
-def under_a_light(gap: float) -> Scene:
+def under_a_light(gap: float) -> tuple[Scene, float]:
     """A plane in a general place, and a light of radius 1 that is so far off its point 0.7 aside.
 
     The camera looks at the point from below the light's equator, so low that its picture must be
@@ -179,22 +156,104 @@ def under_a_light(gap: float) -> Scene:
     low = min(0.5, sqrt(gap) / 2)
     eye = point + 3 * np.array([0.8 * sqrt(1 - low**2), 0.6 * sqrt(1 - low**2), low])
     corners = [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)]
-    return Scene(
+    scene = Scene(
         camera_at(eye, point, UP, fov=1e-6),
         [
             Mesh(corners, [(0, 1, 2), (0, 2, 3)], material=Diffuse(1)),
             Sphere(np.add(point, (0, 0, 1 + gap)), 1, radiance=1),
         ],
     )
+    return scene, irradiance(1 / (1 + gap), 1)
 
 
-def seen(mean: Callable[[Scene, int], float]) -> Measure:
-    """Error of the light that the plane under a light reflects."""
-    return lambda gap, samples: relative(
-        pi * mean(under_a_light(gap), samples), irradiance(1 / (1 + gap), 1)
+def at_pole(side: int) -> Callable[[float], Lit]:
+    """Lights so far off the pole of the basis around their direction, on either side of it."""
+
+    def light(angle: float) -> Lit:
+        center = [_rounded(2 * x) for x in (sin(angle), 0.0, side * cos(angle))]
+        return Sphere(center, 0.5, radiance=1), side * UP
+
+    return light
+
+
+def floor_below(*above: Sphere) -> Scene:
+    """A white floor, of which the camera sees the origin, and what stands above it."""
+    corners = [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)]
+    floor = Mesh(corners, [(0, 1, 2), (0, 2, 3)], material=Diffuse(1))
+    return Scene(camera_at((2, 3, 1), ORIGIN, UP), [floor, *above])
+
+
+def light_within(gap: float) -> tuple[Scene, float]:
+    """A light around another one that is smaller by so much, and five times as bright."""
+    center = (0.5, 0.3, 2)
+    outer, inner = Sphere(center, 0.7, radiance=1), Sphere(center, 0.7 * (1 - gap), radiance=5)
+    distance = hypot(*center)
+    return floor_below(outer, inner), irradiance(0.7 / distance, 2 / distance)
+
+
+def occluder(radius: float) -> tuple[Scene, float]:
+    """A black ball that touches a light of radius 1 where it is nearest to the origin."""
+    ball = Sphere((0, 0, 2 - radius), radius, material=Diffuse(0))
+    scene = floor_below(Sphere((0, 0, 3), 1, radiance=1), ball)
+    return scene, pi * (1 / 9 - (radius / (2 - radius)) ** 2)
+
+
+def weak_light(ratio: float) -> tuple[Scene, float]:
+    """A red light beside a green one, whose radiance is so many times as large."""
+    center, green = (1.5, 0.5, 1), (0, ratio**0.5, 0)
+    scene = floor_below(
+        Sphere(center, 0.4, radiance=(ratio**-0.5, 0, 0)), Sphere((-1, 1, 2), 0.4, radiance=green)
+    )
+    distance = hypot(*center)
+    return scene, ratio**-0.5 * irradiance(0.4 / distance, 1 / distance)
+
+
+def many_lights(count: float) -> tuple[Scene, float]:
+    """So many lights of different radiance all over the sky; the weights of a Fibonacci lattice."""
+    number = np.arange(int(count)) + 0.5
+    height, turn = 0.2 + 0.8 * number / count, pi * (1 + 5**0.5) * number
+    flat = np.sqrt(1 - height**2)
+    centers = 5 * np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+    radiances = 1 + number % 7
+    lights = [Sphere(c, 0.05, radiance=L) for c, L in zip(centers, radiances, strict=True)]
+    return floor_below(*lights), float(irradiance(0.01, 1) * (radiances * height).sum())
+
+
+def seen(
+    scene: Callable[[float], tuple[Scene, float]], mean: Callable[[Scene, int], float]
+) -> Measure:
+    """Error of the irradiance that the camera sees reflected by a white floor."""
+
+    def error(value: float, samples: int) -> float:
+        lit, expected = scene(value)
+        return relative(pi * mean(lit, samples), expected)
+
+    return error
+
+
+def in_picture(
+    name: str,
+    parameter: str,
+    values: tuple[float, ...],
+    scene: Callable[[float], tuple[Scene, float]],
+    naive: str,
+) -> Case:
+    """A case of light that a floor reflects, in a picture."""
+    return Case(
+        name=name,
+        parameter=parameter,
+        values=values,
+        quick=(values[0], values[-1]),
+        error=seen(scene, mean_in_drpt),
+        bound=1e-3,
+        reason="a quarter of a step of 8 bits, and above the noise of the samples",
+        naive=naive,
+        mitsuba=seen(scene, mean_in_mitsuba),
     )
 
 
+ANGLES = (1.0, 0.1, 1e-2, 1e-4, 1e-8, 1e-12)
+POLE = "a basis from a cross product with the axis has no direction there"
 CONE = "1 - √(1 - s²) cancels: wrong by 7 % at 1e-3, and the light is black below 1.7e-4"
 NEAR = "d² - r² cancels: the light that remains is wrong by 0.4 % at 1e-3, by 37 % at 1e-4"
 
@@ -206,18 +265,48 @@ CASES = (
     sphere_light(
         "wholly below", "r/d", SINES, at_sine(lambda s: -1.5 * s, UP), "rounding lets some through"
     ),
+    sphere_light("at the pole of the basis", "angle", ANGLES, at_pole(1), POLE),
+    sphere_light("at the other pole", "angle", ANGLES, at_pole(-1), POLE),
     sphere_light("close above", "d/r - 1", GAPS, at_gap(0.0), NEAR),
     sphere_light("close aside", "d/r - 1", GAPS, at_gap(pi / 3), NEAR),
     sphere_light("close, mostly below", "d/r - 1", GAPS, at_gap(2.0), NEAR),
     Case(
         name="sphere light, close above, in a picture",
         parameter="d/r - 1",
-        values=GAPS,
+        values=GAPS[:-1],
         quick=(1.0, 1e-6),
-        error=seen(mean_in_drpt),
+        error=seen(under_a_light, mean_in_drpt),
         bound=ERROR,
         reason=REASON,
         naive="the offset of the shadow ray leads into the light, and the point is black",
-        mitsuba=seen(mean_in_mitsuba),
+        mitsuba=seen(under_a_light, mean_in_mitsuba),
+    ),
+    in_picture(
+        "light within a light",
+        "gap / radius",
+        (0.5, 0.1, 1e-2, 1e-3, 1e-4, 4e-5),
+        light_within,
+        "shadow rays that end short of their light see the inner one through the outer",
+    ),
+    in_picture(
+        "ball that touches a light",
+        "radius / radius of the light",
+        (0.5, 0.1, 1e-2, 1e-3),
+        occluder,
+        "shadow rays that end at 99.9 % of their way miss what touches the light",
+    ),
+    in_picture(
+        "weak light beside a strong one",
+        "ratio of radiances",
+        (1.0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12),
+        weak_light,
+        "a light that is chosen by power alone is never found",
+    ),
+    in_picture(
+        "many lights",
+        "lights",
+        (1.0, 10.0, 64.0, 65.0, 100.0, 1000.0),
+        many_lights,
+        "a cumulative float32 sum of probabilities does not end at 1",
     ),
 )

@@ -1,15 +1,17 @@
-"""Shapes on the device: closest hits of rays that the host chooses; meshes to shoot at."""
+"""Shapes in drpt and in Mitsuba: closest hits of rays that the host chooses; meshes to shoot at."""
 
 from __future__ import annotations
 
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import drjit as dr
 import numpy as np
 
 from benchmarks.stress.pictures import camera_at
 from drpt import Diffuse, Mesh, Mode, Scene, Sphere
+from drpt.crosscheck import to_mitsuba
+from drpt.crosscheck.variant import load_mitsuba
 from drpt.kernel.camera import Ray
 from drpt.kernel.intersect import closest_hit
 from drpt.kernel.launch import make_launcher
@@ -25,15 +27,19 @@ DULL = Diffuse(0.5)
 
 
 class Found(NamedTuple):
-    """Hits on the host; ``primitive`` is -1 where there is none."""
+    """Hits on the host.
 
-    primitive: Ints
-    distance: Floats
+    Whether they are of a surface that ``reflects``, and of which ``sphere``, counted from 0, in a
+    world without meshes; where new rays start, and the normal on that side.
+    """
+
+    reflects: Bools
+    sphere: Ints
     point: Floats
     normal: Floats
 
 
-class World:
+class Drpt:
     """Shapes whose kernel has its origin at that of the scene, and the rays that meet them."""
 
     def __init__(self, *shapes: Shape) -> None:
@@ -52,20 +58,43 @@ class World:
         n = len(origins)
         valid, primitive = (np.broadcast_to(np.array(x), n) for x in (hit.valid, hit.primitive))
         return Found(
-            np.where(valid, primitive.astype(np.int64), -1),
-            np.broadcast_to(to_host(hit.distance), n),
+            valid & (primitive < self.scene.first_light),
+            primitive.astype(np.int64),
             to_host(hit.point),
             to_host(hit.normal),
         )
-
-    def reflects(self, found: Found) -> Bools:
-        """Which hits are of surfaces that reflect."""
-        return (found.primitive >= 0) & (found.primitive < self.scene.first_light)
 
     def _vectors(self, values: Floats) -> Any:
         types = self.scene.types
         columns = np.ascontiguousarray(values.astype(np.float32).T)
         return types.Array3f(*(types.Float32(column) for column in columns))
+
+
+class Mitsuba:
+    """The same shapes in Mitsuba."""
+
+    def __init__(self, *shapes: Shape) -> None:
+        self.mi = load_mitsuba()
+        self.scene = to_mitsuba(Scene(camera_at((0, 0, 9), (0, 0, 0)), shapes))
+
+    def closest(self, origins: Floats, directions: Floats) -> Found:
+        """Closest hits of rays (n, 3), rounded to float32."""
+        mi = self.mi
+        ray = mi.Ray3f(mi.Point3f(origins.T.astype("f")), mi.Vector3f(directions.T.astype("f")))
+        hit = self.scene.ray_intersect(ray)
+        number = mi.UInt32(0)
+        for shape in self.scene.shapes():
+            number[hit.shape == mi.ShapePtr(shape)] = int(shape.id().removeprefix("shape"))
+        normal = mi.Vector3f(dr.select(dr.dot(hit.n, ray.d) < 0, hit.n, -hit.n))
+        return Found(
+            np.asarray(hit.is_valid() & ~hit.shape.is_emitter(), bool),
+            np.asarray(number, np.int64),
+            to_host(hit.spawn_ray(normal).o),
+            to_host(normal),
+        )
+
+
+World: TypeAlias = type[Drpt | Mitsuba]
 
 
 def beside(size: float, offset: float) -> tuple[Floats, Sphere]:

@@ -36,14 +36,21 @@ def sphere_light_irradiance(radiance: float, sigma: float, omega: float) -> floa
     sin²σ cos ω t0 - sin σ cos σ sin ω sin t0. The unit circle closes the contour between the
     azimuths ±φ0 where the rim crosses the horizon and adds φ0; there
     sin φ0 = sin σ sin t0 and cos φ0 = cos σ / sin ω. σ < π/2 (the receiver is outside the light).
+    With y = tan φ0 = tan σ sin t0 sin ω the sum is sin²σ (cos ω t0 + y) + (atan y - y), where
+    nothing cancels: small lights keep their digits.
     """
     cos_t0 = -math.cos(omega) * math.cos(sigma) / max(math.sin(omega) * math.sin(sigma), 1e-300)
     t0 = math.acos(min(max(cos_t0, -1.0), 1.0))
     sin_t0 = math.sin(t0) if 0 < t0 < math.pi else 0.0
-    phi0 = math.atan2(math.sin(sigma) * sin_t0 * math.sin(omega), math.cos(sigma))
-    arc = math.sin(sigma) ** 2 * math.cos(omega) * t0
-    arc -= math.sin(sigma) * math.cos(sigma) * math.sin(omega) * sin_t0
-    return radiance * (arc + phi0)
+    y = math.tan(sigma) * sin_t0 * math.sin(omega)
+    return radiance * (math.sin(sigma) ** 2 * (math.cos(omega) * t0 + y) + _atan_minus(y))
+
+
+def _atan_minus(y: float) -> float:
+    """Return atan y - y; from its series where the difference would cancel."""
+    if y > 0.1:
+        return math.atan(y) - y
+    return math.fsum((-1) ** k * y ** (2 * k + 1) / (2 * k + 1) for k in range(1, 9))
 
 
 def sphere_light_flux_through_rectangle(
