@@ -10,6 +10,7 @@ import numpy as np
 
 from drpt.kernel.mesh import TriangleMesh
 from drpt.kernel.primitives import UNROLL_LIMIT
+from drpt.kernel.solids import edge_owners
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,7 +53,8 @@ class DeviceScene:
     mesh
         The triangles that reflect, where they are too many for facets.
     reach
-        Largest coordinate of each facet or triangle, where some are not in a body.
+        Largest coordinate of each facet that shares an edge, and of each triangle of a mesh;
+        0 for other facets, None without such.
     light_facets, light_mesh
         The same for those that emit.
     balls
@@ -118,6 +120,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
     solids = primitives.solids()
     loose = tuple(_loose(primitives, solids))
+    reach = _reach(primitives, [number for number, *_ in loose])
     return DeviceScene(
         types=types,
         first_smooth=primitives.first_smooth,
@@ -127,7 +130,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         solids=solids,
         loose_facets=loose,
         mesh=TriangleMesh(triangles, types) if len(triangles) else None,
-        reach=array(_reach(primitives)) if len(triangles) or loose else None,
+        reach=array(reach) if reach.any() else None,
         light_facets=primitives.light_facets,
         light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
@@ -154,9 +157,14 @@ def _loose(primitives: Primitives, solids: tuple[Solid, ...]) -> Iterator[tuple[
             yield number, facet, blocks
 
 
-def _reach(primitives: Primitives) -> NDArray[np.float64]:
-    outlines = [*(facet.corners for facet in primitives.facets), *primitives.triangles]
-    return np.array([np.abs(corners).max() for corners in outlines])
+def _reach(primitives: Primitives, loose: list[int]) -> NDArray[np.float64]:
+    """How far triangles reach whose seams are wider than the rounding of a point on them."""
+    reach = np.zeros(len(primitives.facets))
+    for numbers in edge_owners([primitives.facets[i].corners for i in loose]).values():
+        if len(numbers) > 1:
+            for i in (loose[number] for number in numbers):
+                reach[i] = np.abs(primitives.facets[i].corners).max()
+    return np.concatenate([reach, np.abs(primitives.triangles).max(axis=(1, 2), initial=0)])
 
 
 def _own_copy(mapped: Float) -> Float:

@@ -297,7 +297,7 @@ def _surface(
 ) -> Hit:
     row = scene.geometry_row(primitive, valid)
     p = dr.fma(ray.direction, t, ray.origin)
-    point, normal, reach = _on_primitive(scene, features, row, p, primitive)
+    point, normal, reach = _on_primitive(scene, features, row, p, ray, primitive)
     front = dr.dot(normal, ray.direction) < 0
     facing = dr.select(front, normal, -normal)
     shading_normal = facing
@@ -336,12 +336,12 @@ def _is_sphere(scene: DeviceScene, primitive: UInt32) -> Bool:
 
 
 def _on_primitive(
-    scene: DeviceScene, features: Features, row: Array4f, p: Array3f, primitive: UInt32
+    scene: DeviceScene, features: Features, row: Array4f, p: Array3f, ray: Ray, primitive: UInt32
 ) -> _Place:
     if not features.spheres:
         return _on_facet(row, p)
     reflect = _some_spheres_reflect(scene, features)
-    on_sphere = _on_sphere(row, p) if reflect else _on_sphere_light(row, p)
+    on_sphere = _on_sphere(row, p, ray) if reflect else _on_sphere_light(row, p)
     for number, ball in enumerate(scene.balls, start=scene.first_sphere):
         if ball.power is not None:
             on_ball = _on_large_sphere(ball, ball.power, p)
@@ -357,9 +357,12 @@ def _on_facet(row: Array4f, p: Array3f) -> _Place:
     return point, normal, _largest(point)
 
 
-def _on_sphere(row: Array4f, p: Array3f) -> _Place:
+def _on_sphere(row: Array4f, p: Array3f, ray: Ray) -> _Place:
+    """A sphere so small that p rounds to its centre faces the ray."""
     center, radius = vec3(row[0], row[1], row[2]), row[3]
-    normal = dr.normalize(p - center)
+    spoke = p - center
+    length = dr.norm(spoke)
+    normal = dr.select(length > 0, spoke * dr.rcp(length), -ray.direction)
     point = dr.fma(normal, radius, center)
     return point, normal, _largest(point) + radius
 
@@ -383,7 +386,10 @@ def _largest(v: Array3f) -> Float:
 def _interpolated_normal(
     scene: DeviceScene, point: Array3f, facing: Array3f, primitive: UInt32, valid: Bool
 ) -> Array3f:
-    """The corners' normals weighted by barycentric coordinates, on the side of ``facing``."""
+    """The corners' normals weighted by barycentric coordinates, on the side of ``facing``.
+
+    That is ``facing`` itself where the corners round to a line, and where the normals cancel.
+    """
     types = scene.types
     smooth = valid & (primitive >= scene.first_smooth) & (primitive < scene.first_sphere)
     first = 6 * (primitive - scene.first_smooth)
@@ -398,4 +404,4 @@ def _interpolated_normal(
     mixed = (1 - weight_b - weight_c) * normal_a + weight_b * normal_b + weight_c * normal_c
     unit = dr.normalize(mixed)
     oriented = dr.select(dr.dot(unit, facing) < 0, -unit, unit)
-    return dr.select(smooth, oriented, facing)
+    return dr.select(smooth & (dr.squared_norm(mixed) > 0), oriented, facing)

@@ -96,10 +96,7 @@ def make_solids(outlines: Sequence[Array], points: Array, radii: Array) -> tuple
 
 def find_bodies(outlines: Sequence[Array]) -> Iterator[list[Side]]:
     """The sides of each body among convex polygons (k, 3) that share edges."""
-    owners: dict[Edge, list[int]] = defaultdict(list)
-    for number, outline in enumerate(outlines):
-        for edge in edges(tuple(map(tuple, outline.tolist()))):
-            owners[frozenset(edge)].append(number)
+    owners = edge_owners(outlines)
     for members in _connected(len(outlines), owners.values()):
         shared = {edge: at for edge, at in owners.items() if at[0] in members}
         if max(map(len, shared.values())) > 2:
@@ -111,6 +108,15 @@ def find_bodies(outlines: Sequence[Array]) -> Iterator[list[Side]]:
         sides = _sides([*faces, *((rim, None) for rim in rims)])
         if sides is not None:
             yield sides
+
+
+def edge_owners(outlines: Sequence[Array]) -> dict[Edge, list[int]]:
+    """Numbers of the polygons (k, 3) that have each edge."""
+    owners: dict[Edge, list[int]] = defaultdict(list)
+    for number, outline in enumerate(outlines):
+        for edge in edges(tuple(map(tuple, outline.tolist()))):
+            owners[frozenset(edge)].append(number)
+    return owners
 
 
 def _connected(count: int, groups: Iterable[list[int]]) -> list[set[int]]:
