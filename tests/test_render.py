@@ -287,17 +287,17 @@ def test_a_render_goes_on_after_an_interrupt_amid_a_pass(monkeypatch: pytest.Mon
 def test_injected_infinities_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     from drpt.kernel.path import Tracer
 
-    trace = Tracer.trace
+    follow = Tracer.follow
 
-    def broken(self: Tracer, ray: Any, sampler: Any) -> Any:
+    def broken(self: Tracer, first: Any, sampler: Any) -> Any:
         import drjit as dr
 
-        radiance, rays = trace(self, ray, sampler)
+        radiance, rays = follow(self, first, sampler)
         bad = dr.select(sampler.pixel == 5, float("nan"), 0)
         bad = dr.select(sampler.pixel == 7, float("inf"), bad)
         return radiance + bad, rays
 
-    monkeypatch.setattr(Tracer, "trace", broken)
+    monkeypatch.setattr(Tracer, "follow", broken)
     with pytest.warns(RuntimeWarning, match="12 of"):
         result = drpt.render(SCENE, 6, 1)
     assert result.non_finite == 12
@@ -313,16 +313,16 @@ def test_a_sample_that_is_not_finite_is_named_and_can_be_traced_again(
 ) -> None:
     from drpt.kernel.path import Tracer
 
-    trace = Tracer.trace
+    follow = Tracer.follow
 
-    def broken(self: Tracer, ray: Any, sampler: Any) -> Any:
+    def broken(self: Tracer, first: Any, sampler: Any) -> Any:
         import drjit as dr
 
-        radiance, rays = trace(self, ray, sampler)
+        radiance, rays = follow(self, first, sampler)
         bad = (sampler.pixel == 31) & (sampler.index >= 41)
         return radiance + dr.select(bad, float("inf"), 0), rays
 
-    monkeypatch.setattr(Tracer, "trace", broken)
+    monkeypatch.setattr(Tracer, "follow", broken)
     monkeypatch.setattr(MODULE, "LAUNCH_PATHS", 16 * SCENE.camera.width * SCENE.camera.height)
     monkeypatch.setattr(MODULE, "LAUNCH_LANES", 4)
     settings: Any = {"spp": 64, "mode": "explicit", "sampler": sampler, "seed": 3}

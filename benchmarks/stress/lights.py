@@ -14,7 +14,7 @@ from drpt import Diffuse, Mesh, Mode, Scene, Sphere
 from drpt.crosscheck.variant import load_mitsuba
 from drpt.kernel.device_scene import upload
 from drpt.kernel.estimator import Features
-from drpt.kernel.light import sample_light
+from drpt.kernel.light import Receiver, sample_light
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SobolSampler
 from tests.conftest import TYPES, to_device, to_host
@@ -57,8 +57,8 @@ def in_drpt(light: Sphere, normal: Floats, samples: int) -> float:
     primitives = make_primitives(Scene(camera_at((0, 0, 5), ORIGIN), [FLOOR, light]))
     scene = upload(primitives, TYPES)
     features = Features.of(primitives, 1, Mode.EXPLICIT)
-    point = to_device([ORIGIN - primitives.origin])
-    sample = sample_light(scene, features, Mode.EXPLICIT, point, TYPES.UInt32([0]), sobol(samples))
+    at = Receiver(to_device([ORIGIN - primitives.origin]), to_device([normal]))
+    sample = sample_light(scene, features, Mode.EXPLICIT, at, TYPES.UInt32([0]), sobol(samples))
     cosine = np.maximum(to_host(sample.direction) @ normal, 0)
     return float((to_host(sample.inverse_pdf) * cosine).mean())
 

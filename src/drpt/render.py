@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from drpt.kernel.launch import Launcher
+    from drpt.kernel.launch import Launcher, Sums
 
 __all__ = [
     "SAMPLERS",
@@ -44,6 +44,8 @@ LAUNCH_PATHS = 2**24
 """Paths of a launch: long enough to be worth it, short enough to be interrupted."""
 LAUNCH_PIXELS = 2**20
 """Pixels of a launch at the most, which bounds its memory to some 100 MB."""
+SHARING_SPP = 16
+"""With so many samples per pixel, edges are smooth even if a few share a camera ray."""
 LAUNCH_LANES = 2**18
 """Lanes of a launch at the least: small pictures use several for each pixel."""
 
@@ -181,7 +183,8 @@ class Rendering:
             for part in _parts(pixels):
                 if part.start < self._pixels:
                     continue
-                replicates = min(len(samples), max(1, LAUNCH_LANES // len(part)))
+                rays = -(-len(samples) // launcher.paths_per_ray)
+                replicates = min(rays, max(1, LAUNCH_LANES // len(part)))
                 with backend.interrupts_put_off():
                     sums = launcher.launch(part, samples, replicates, self.seed)
                 self._film.add(part, sums.radiance, len(samples))
@@ -202,13 +205,18 @@ class Rendering:
     ) -> tuple[int, int, int]:
         """Column, row and number of the first sample of a pixel that is not finite."""
         row, column = divmod(pixel, self.scene.camera.width)
-        for start in range(samples.start, samples.stop, LAUNCH_LANES):
-            some = range(start, min(start + LAUNCH_LANES, samples.stop))
+        first, stop = samples.start, samples.stop
+        while stop - first > 1:
+            middle = (first + stop) // 2
             with backend.interrupts_put_off():
-                finite = np.isfinite(launcher.launch_samples(pixel, some, self.seed)).all(axis=1)
-            if not finite.all():
-                return column, row, start + int(finite.argmin())
-        raise RuntimeError(f"pixel ({column}, {row}) has a sample that is not finite only at times")
+                sums = self._trace(launcher, pixel, range(first, middle))
+            first, stop = (first, middle) if sums.non_finite else (middle, stop)
+        return column, row, first
+
+    def _trace(self, launcher: Launcher, pixel: int, samples: range) -> Sums:
+        """Samples of a single pixel."""
+        lanes = min(len(samples), LAUNCH_LANES)
+        return launcher.launch(range(pixel, pixel + 1), samples, lanes, self.seed)
 
     def sample(self, column: int, row: int, number: int) -> NDArray[np.float64]:
         """Radiance (3,) of one sample of a pixel, the same that the passes trace.
@@ -219,10 +227,10 @@ class Rendering:
         column = _check_whole("column", column, 0, camera.width - 1)
         row = _check_whole("row", row, 0, camera.height - 1)
         number = _check_whole("number", number, 0, self.spp - 1)
-        samples, pixel = range(number, number + 1), row * camera.width + column
+        pixel = row * camera.width + column
         with backend.interrupts_put_off():
-            radiance = self.launcher().launch_samples(pixel, samples, self.seed)
-        return np.asarray(radiance[0])
+            sums = self._trace(self.launcher(), pixel, range(number, number + 1))
+        return np.asarray(sums.radiance[0])
 
     def launcher(self) -> Launcher:
         """Put the scene on the device."""
@@ -230,7 +238,13 @@ class Rendering:
         from drpt.kernel.launch import make_launcher
 
         return make_launcher(
-            types, self.scene, self.bounces, self.mode, self.sampler, jitter=self.jitter
+            types,
+            self.scene,
+            self.bounces,
+            self.mode,
+            self.sampler,
+            jitter=self.jitter,
+            share_rays=self.sampler == "sobol" and self.spp >= SHARING_SPP,
         )
 
     def result(self) -> Result:

@@ -20,6 +20,10 @@ DIFFUSE, PHONG = drpt.Diffuse(0.5), drpt.Phong(0.5, 9)
 BALL = drpt.Sphere((0, 0, 3), 1, material=DIFFUSE)
 TRIANGLE = drpt.Mesh(CORNERS, [[0, 1, 2]], material=DIFFUSE)
 SMOOTH = drpt.Mesh(CORNERS, [[0, 1, 2]], [[0, 0, 1]] * 3, material=PHONG)
+CUBE = [[x, y, z] for x in (-9, 9) for y in (-9, 9) for z in (-9, 9)]
+QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+HALVES = [half for a, b, c, d in QUADS for half in ((a, b, c), (a, c, d))]
+ROOM = drpt.Mesh(CUBE, HALVES, material=DIFFUSE)
 LAMP = drpt.Sphere((0, 0, 7), 1, radiance=1)
 PANEL = drpt.Mesh(CORNERS, [[0, 1, 2]], radiance=1)
 
@@ -79,7 +83,7 @@ def test_what_modes_do(
 
 
 def test_a_scene_of_everything_has_all_features() -> None:
-    everything = set(Features.__dataclass_fields__)
+    everything = set(Features.__dataclass_fields__) - {"shared_rays"}
     assert features(BALL, TRIANGLE, SMOOTH, LAMP, PANEL) == everything
 
 
@@ -93,6 +97,27 @@ def test_spheres_alone() -> None:
         "sphere_light_samples",
         "mis",
     }
+
+
+@pytest.mark.parametrize(
+    ("mode", "bounces", "shapes", "expected"),
+    [
+        ("mis", 2, [ROOM, LAMP], True),
+        ("explicit", 5, [ROOM, LAMP], True),
+        ("explicit-uniform", 2, [ROOM, LAMP], False),  # noise of points on the light
+        ("implicit", 2, [ROOM, LAMP], False),
+        ("mis", 1, [ROOM, LAMP], False),  # all the noise is of the first vertex
+        ("mis", 2, [ROOM, LAMP, PANEL], False),  # noise of the choice
+        ("mis", 2, [ROOM, PANEL], False),
+        ("mis", 2, [LAMP], False),  # outdoors
+        ("mis", 2, [ROOM, drpt.Sphere((0, 0, 99), 1, radiance=1)], False),
+    ],
+)
+def test_rays_are_shared_where_direct_light_has_little_noise(
+    mode: str, bounces: int, shapes: list[Shape], expected: bool
+) -> None:
+    found = features(BALL, *shapes, bounces=bounces, mode=mode)
+    assert ("shared_rays" in found) is expected
 
 
 def test_triangles_alone() -> None:

@@ -15,10 +15,13 @@ from tests.oracle.statistics import mean_of_independent
 
 if TYPE_CHECKING:
     from drpt.scene import Shape
+    from tests.oracle.arrays import Floats
 
 MODES = tuple(drpt.Mode)
 # The oracle takes 10 µs a path: what a few seconds of it detect.
 DETECTABLE = 0.06
+# Relative, of a sample without noise: the roundings of sin²σ cos ω, also where ω is grazing.
+DIRECT = 2e-6
 
 FLOOR = drpt.Mesh(
     [[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]],
@@ -99,6 +102,34 @@ def test_light_adds_up_over_bounces(mode: str) -> None:
     assert means[0] < means[1] < means[2]
     assert (np.diff(means) >= -1e-7).all()  # the same samples, with something added
     assert np.diff(means)[-1] < 0.1 * np.diff(means)[0]
+
+
+@pytest.mark.parametrize("height", [3.0, 0.3, 0.1001])
+def test_direct_light_has_no_noise_where_a_diffuse_surface_sees_a_whole_light(
+    height: float,
+) -> None:
+    """All samples are ρ L sin²σ cos ω, down to a light that almost rests on the floor."""
+    distance = np.hypot(1, height)
+    expected = 0.25 * (0.1 / distance) ** 2 * height / distance
+    samples = floor_by_a_small_light(height)
+    assert samples == pytest.approx(expected, rel=DIRECT)
+
+
+def test_direct_light_has_noise_where_the_horizon_cuts_the_light() -> None:
+    samples = floor_by_a_small_light(0.0999)
+    assert samples.std() > 0.1 * samples.mean()
+
+
+def floor_by_a_small_light(height: float) -> Floats:
+    """Return samples of a point of a diffuse floor with a light aside."""
+    camera = drpt.Camera((0, -1, 3), (0, 0, 0), (0, 1, 0), 1e-6, 1, 1)
+    floor = drpt.Mesh(FLOOR.vertices, FLOOR.faces, material=drpt.Diffuse(0.25))
+    scene = drpt.Scene(camera=camera, shapes=[floor, drpt.Sphere((1, 0, height), 0.1, radiance=1)])
+    images = [
+        drpt.render(scene, 1, 1, "explicit", sampler="independent", seed=seed, jitter=False).image
+        for seed in range(64)
+    ]
+    return np.array(images, np.float64)
 
 
 def test_rays_to_vertices_and_lights_are_counted() -> None:

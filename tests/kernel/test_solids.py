@@ -117,7 +117,7 @@ def test_the_open_side_on_which_all_stands_casts_no_shadow() -> None:
 @pytest.mark.parametrize("name", ["cornell-box", "cornell-box-glossy"])
 def test_the_cornell_box_is_three_bodies(name: str) -> None:
     primitives = make_primitives(drpt.load_scene(name))
-    room, *boxes = primitives.solids()
+    room, *boxes = primitives.solids
     assert room.encloses
     assert len(room.facets) == 6
     assert [len(body.facets) for body in boxes] == [5, 5]
@@ -267,8 +267,8 @@ def test_pictures_of_bodies_are_those_of_facets(mode: str, monkeypatch: pytest.M
     """The same random numbers, so but few paths differ: those that pass edges by a rounding."""
     scene = drpt.load_scene("cornell-box")
     scene = replace(scene, camera=replace(scene.camera, width=64, height=64))
-    bodies = drpt.render(scene, 16, 4, mode).image
+    bodies = drpt.render(scene, 16, 4, mode, sampler="independent").image
     monkeypatch.setattr("drpt.kernel.primitives.make_solids", lambda *_: ())
-    facets = drpt.render(scene, 16, 4, mode).image
+    facets = drpt.render(scene, 16, 4, mode, sampler="independent").image
     close = np.isclose(bodies, facets, rtol=1e-3).all(axis=2)
     assert close.mean() > 0.99

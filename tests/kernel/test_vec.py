@@ -48,6 +48,17 @@ def test_to_world_is_linear_in_the_basis() -> None:
     np.testing.assert_allclose(world, expected, rtol=0, atol=6 * ROUNDINGS)
 
 
+def test_to_local_is_what_to_world_undoes() -> None:
+    n = normals()
+    world = np.random.default_rng(4).standard_normal(n.shape).astype(np.float32)
+    basis = frame(to_device(n))
+    expected = np.einsum("nc,knc->nk", world, np.stack([to_host(v) for v in basis]))
+    local = basis.to_local(to_device(world))
+    np.testing.assert_allclose(to_host(local), expected, rtol=0, atol=6 * ROUNDINGS)
+    back = to_host(basis.to_world(local))
+    np.testing.assert_allclose(back, world, rtol=0, atol=12 * ROUNDINGS)
+
+
 def test_reflect_mirrors_at_the_normal() -> None:
     n, w = normals(), np.random.default_rng(3).permutation(normals())
     mirrored = to_host(reflect(to_device(w), to_device(n)))

@@ -19,10 +19,13 @@ QUADRATURE = 1e-6  # relative error of float32 densities summed in float64
 UNIT = 2.5e-7  # of a direction's length
 CONE = 2e-7  # relative, sin θ; three to four roundings of 6e-8
 LOBE = 7e-7  # relative, 1 - cos θ, taken from x² + y² with rounded x and y
+LIFTED = 6e-7  # of a direction in a projected cap and of its cosine, relative to sin σ
 POWER = 1e-6  # relative, cos^α θ down to e^-5: the exponent's rounding counts five times
 LOG = 2.5e-7  # relative, log1p and expm1
 
 HEIGHTS = [2, 1, 0.1, 1e-3, 1e-6, 1e-9, 1e-12]
+SINES = [0.98, 0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
+GRAZING = [0, 0.5, 0.9, 0.999]  # a in cos ω = sin^a σ: 0 overhead, at 1 the cap touches the horizon
 EXPONENTS = [0, 1, 2, 50, 1e3, 1e5, 1e6]
 ENDS = [0, 2.0**-24, 0.5, 1 - 2.0**-24]
 
@@ -58,6 +61,17 @@ def cone(height: float, bias: float = 0.0) -> Warp:
     )
 
 
+def projected(sine: float, bias: float = 0.0) -> Warp:
+    s = to_device([sine])
+    h = to_device([sine**2 / (1 + np.sqrt(1 - sine**2))])
+    normal = to_device([(0, 0, 1)])
+    return Warp(
+        lambda u: warp.square_to_projected_cap(u, s * (1 + bias), h, normal)[0],
+        lambda below: (1 - below) * warp.INV_PI / (s * s),
+        to_host(h) * np.linspace(0, 1, polar.CELLS + 1),
+    )
+
+
 def lobe(exponent: float, bias: float = 0.0) -> Warp:
     a = to_device([exponent])
     return Warp(
@@ -71,10 +85,12 @@ WARPS = {
     "sphere": sphere(),
     "hemisphere": hemisphere(),
     **{f"cone {height:g}": cone(height) for height in HEIGHTS},
+    **{f"projected cap {sine:g}": projected(sine) for sine in SINES},
     **{f"lobe {exponent:g}": lobe(exponent) for exponent in EXPONENTS},
 }
 BIASED = {
     **{f"cone {height:g}": cone(height, BIAS) for height in HEIGHTS[1:]},
+    **{f"projected cap {sine:g}": projected(sine, BIAS) for sine in SINES},
     **{f"lobe {exponent:g}": lobe(exponent, BIAS) for exponent in EXPONENTS},
 }
 
@@ -126,6 +142,62 @@ def test_cone_is_as_wide_as_in_float64(height: float) -> None:
     sin_theta = np.hypot(w[:, 0], w[:, 1])
     np.testing.assert_allclose(sin_theta, np.sqrt(below * (2 - below)), rtol=CONE, atol=0)
     np.testing.assert_allclose(w[:, 2], 1 - below, rtol=0, atol=UNIT)
+
+
+def projected_cap(u: Any, sine: float, normal: Floats) -> tuple[Floats, Floats]:
+    """Sample a cap by the warp: directions (n, 3) and their cosines (n,) at the normal."""
+    height = sine**2 / (1 + np.sqrt(1 - sine**2))
+    cap = to_device([sine]), to_device([height]), to_device([normal])
+    w, cosine = warp.square_to_projected_cap(u, *cap)
+    return to_host(w), to_host(cosine)
+
+
+def lifted_ellipse(u: Floats, sine: float, normal: Floats) -> tuple[Floats, Floats]:
+    """Return directions (n, 3) of a cap around z, and their cosines (n,) at the normal.
+
+    In the receiver's plane let ``back`` point away from the cap's centre, ``across`` be at right
+    angles to it. The cap's rim projects to an ellipse with its centre at -cos σ sin ω along
+    ``back`` and the semi-axes sin σ cos ω along it, sin σ across. A point -x back + y across of
+    the ellipse is lifted to the sphere by √((1 - x)(1 + x) - y²). With the elevation κ = π/2 - ω,
+    1 - cos σ sin ω = sin²((κ - σ)/2) + sin²((κ + σ)/2): nothing cancels at the horizon.
+    """
+    sigma, elevation = np.arcsin(sine), np.arcsin(normal[2])
+    azimuth = np.arctan2(normal[1], normal[0])
+    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0])
+    back = np.cross(across, normal)
+    turn = 2 * np.pi * u[:, 1] - azimuth
+    toward = sine * np.sqrt(u[:, 0]) * np.sin(elevation) * np.cos(turn)
+    y = sine * np.sqrt(u[:, 0]) * np.sin(turn)
+    x = np.cos(sigma) * np.cos(elevation) - toward
+    rim = np.sin((elevation - sigma) / 2) ** 2 + np.sin((elevation + sigma) / 2) ** 2
+    cosine = np.sqrt((rim + toward) * (1 + x) - y**2)
+    return np.outer(-x, back) + np.outer(y, across) + np.outer(cosine, normal), cosine
+
+
+@pytest.mark.parametrize("sine", SINES)
+@pytest.mark.parametrize("grazing", GRAZING)
+@pytest.mark.parametrize("azimuth", [0.0, 2.5])
+def test_projected_cap_is_a_lifted_ellipse(sine: float, grazing: float, azimuth: float) -> None:
+    sine, cosine = (float(np.float32(value)) for value in (sine, sine**grazing))
+    tilt = np.sqrt(1 - cosine**2)
+    normal = np.array([tilt * np.cos(azimuth), tilt * np.sin(azimuth), cosine])
+    u = np.concatenate([to_host(unit_square(100_000)), [(x, y) for x in ENDS for y in ENDS]])
+    w, cosines = projected_cap(to_device(u), sine, normal)
+    expected, expected_cosines = lifted_ellipse(u, sine, normal)
+    np.testing.assert_allclose(w[:, :2], expected[:, :2], rtol=0, atol=LIFTED * sine)
+    np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1, rtol=0, atol=2 * UNIT)
+    np.testing.assert_allclose(cosines, expected_cosines, rtol=LIFTED, atol=LIFTED * sine)
+    assert (cosines > 0).all()
+
+
+@pytest.mark.parametrize("sine", SINES)
+def test_the_oracle_of_a_projected_cap_keeps_to_the_cap(sine: float) -> None:
+    normal = np.array([np.sqrt(1 - sine), 0, np.sqrt(sine)])
+    w, cosine = lifted_ellipse(to_host(unit_square(10_000)), sine, normal)
+    np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1, rtol=1e-12)
+    np.testing.assert_allclose(w @ normal, cosine, rtol=1e-12)
+    away = np.hypot(w[:, 0], w[:, 1])
+    assert 0.98 * sine < away.max() < sine
 
 
 @pytest.mark.parametrize("exponent", [*EXPONENTS, 1e8])

@@ -96,6 +96,9 @@ class Brdf(NamedTuple):
 
 def make_brdf(scene: DeviceScene, features: Features, hit: Hit, to_viewer: Array3f) -> Brdf:
     """The reflection at a hit; black where there is none."""
+    if not (features.diffuse or features.phong):
+        black = scene.types.Array3f(0)
+        return Brdf(features, black, black.x, hit.normal, hit.shading_normal, to_viewer)
     row = dr.gather(scene.types.Array4f, scene.reflectance, hit.primitive, hit.valid)
     albedo = vec3(row[0], row[1], row[2])
     return Brdf(features, albedo, row[3], hit.normal, hit.shading_normal, to_viewer)

@@ -118,7 +118,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     few_spheres = len(primitives.spheres) <= UNROLL_LIMIT
     first = primitives.first_sphere
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
-    solids = primitives.solids()
+    solids = primitives.solids
     loose = tuple(_loose(primitives, solids))
     reach = _reach(primitives, [number for number, *_ in loose])
     return DeviceScene(

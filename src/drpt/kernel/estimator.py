@@ -68,6 +68,9 @@ class Features:
         Samples of lights of that kind.
     mis
         Weights for both ways to find a light.
+    shared_rays
+        Several paths from the first vertex of one camera ray: in rooms lit by a single sphere,
+        where they go on from there makes the noise, and direct light hardly any.
     """
 
     spheres: bool
@@ -81,6 +84,7 @@ class Features:
     sphere_light_samples: bool
     triangle_light_samples: bool
     mis: bool
+    shared_rays: bool
 
     @classmethod
     def of(cls, primitives: Primitives, bounces: int, mode: Mode) -> Features:
@@ -88,6 +92,8 @@ class Features:
         emission = len(primitives.radiance) > 0
         reflection = emission and bounces > 0 and len(primitives.reflectance) > 0
         direct_light = reflection and mode.samples_lights
+        one_sphere = len(primitives.radiance) == primitives.sphere_lights == 1
+        interior = any(solid.encloses for solid in primitives.solids)
         return cls(
             spheres=emission and len(primitives.spheres) > 0,
             triangles=emission and len(primitives.planes) > 0,
@@ -100,4 +106,9 @@ class Features:
             sphere_light_samples=direct_light and primitives.sphere_lights > 0,
             triangle_light_samples=direct_light and len(primitives.light_corners) > 0,
             mis=direct_light and mode.counts_hits,
+            shared_rays=direct_light
+            and mode.samples_cones
+            and bounces > 1
+            and one_sphere
+            and interior,
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -25,8 +25,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.estimator import Mode
+    from drpt.kernel.path import Vertex
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Scene
+
+
+PATHS_PER_RAY = 4
+"""Paths that share a camera ray, which alone takes half of the time of one with 2 bounces."""
 
 
 class Sums(NamedTuple):
@@ -41,14 +46,54 @@ class Sums(NamedTuple):
     non_finite: int
 
 
+class _Work(NamedTuple):
+    """What a launch is to do: numbers, which are inputs of its kernel.
+
+    Samples count from the first path of the camera ray number ``first_ray``; so many as ``skipped``
+    are not asked for, and those from ``stop`` on.
+    """
+
+    first_pixel: Any
+    pixels: Any
+    paths: Any  # that share a camera ray
+    first_ray: Any
+    skipped: Any
+    stop: Any
+    sharing: Any  # lanes that share the samples of a seed
+    seed: Any
+
+
+class _Totals(NamedTuple):
+    """Sums of a lane, on the device."""
+
+    radiance: Array3f64
+    rays: UInt32
+    non_finite: UInt32
+
+    def plus(self, radiance: Array3f, rays: UInt32) -> _Totals:
+        """With one more sample."""
+        x, y, z = (dr.isfinite(channel) for channel in radiance)
+        return _Totals(
+            self.radiance + type(self.radiance)(radiance),
+            self.rays + rays,
+            self.non_finite + dr.select(x & y & z, 0, 1),
+        )
+
+
 @dataclass
 class Launcher:
-    """A scene and an estimator on the device, ready to trace samples."""
+    """A scene and an estimator on the device, ready to trace samples.
+
+    So many samples after each other as ``paths_per_ray`` share their camera ray and the light
+    that its first vertex gets from lights, from a multiple of that number on; each sample goes on
+    from there by itself.
+    """
 
     tracer: Tracer
     camera: DeviceCamera
     sampler: type[Sampler]
     jitter: bool
+    paths_per_ray: int
 
     def launch(self, pixels: range, samples: range, replicates: int, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range.
@@ -58,12 +103,6 @@ class Launcher:
         """
         lanes = self._launch(pixels, samples, replicates, replicates, _word_of(seed, samples))
         return lanes._replace(radiance=lanes.radiance.sum(axis=0))
-
-    def launch_samples(self, pixel: int, samples: range, seed: int) -> NDArray[np.float64]:
-        """Radiance (samples, 3) of each sample of a pixel by itself; the same kernel once more."""
-        count, word = len(samples), _word_of(seed, samples)
-        lanes = self._launch(range(pixel, pixel + 1), samples, count, count, word)
-        return lanes.radiance[:, 0]
 
     def launch_passes(self, pixels: range, samples: range, passes: range, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range, once in each independent pass.
@@ -79,61 +118,68 @@ class Launcher:
 
         So many after each other are ``sharing`` the samples of a seed; the next ones take the next.
         """
+        if not self.tracer.features.emission:
+            return Sums(np.zeros((lanes, len(pixels), 3)), 0, 0)
         index = self.tracer.scene.types.UInt32
-        numbers = (
-            pixels.start,
-            len(pixels),
-            samples.start & 0xFFFFFFFF,
-            len(samples),
-            sharing,
-            seed_word & 0xFFFFFFFF,
+        start, paths = samples.start & 0xFFFFFFFF, self.paths_per_ray
+        work = _Work(
+            first_pixel=pixels.start,
+            pixels=len(pixels),
+            paths=paths,
+            first_ray=start // paths,
+            skipped=start % paths,
+            stop=start % paths + len(samples),
+            sharing=sharing,
+            seed=seed_word & 0xFFFFFFFF,
         )
         lane = dr.arange(index, len(pixels) * lanes)
-        radiance, rays, non_finite = self._trace(lane, *(dr.opaque(index, n) for n in numbers))
+        totals = self._trace(lane, _Work(*(dr.opaque(index, n) for n in work)))
         with flush_denormals():
-            dr.eval(radiance, rays, non_finite)
+            dr.eval(*totals)
             dr.sync_thread()
-        by_lane = np.stack([np.array(channel) for channel in radiance], axis=-1)
+        by_lane = np.stack([np.array(channel) for channel in totals.radiance], axis=-1)
         by_pixel = by_lane.reshape(lanes, len(pixels), 3)
-        return Sums(by_pixel, _total(rays), _total(non_finite))
+        return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 
-    def _trace(
-        self,
-        lane: UInt32,
-        first_pixel: UInt32,
-        pixels: UInt32,
-        first_sample: UInt32,
-        samples: UInt32,
-        sharing: UInt32,
-        seed: UInt32,
-    ) -> tuple[Array3f64, UInt32, UInt32]:
-        """Sum up the samples of each lane: radiance, rays, and how many were not finite."""
+    def _trace(self, lane: UInt32, work: _Work) -> _Totals:
+        """Sum up the samples of each lane, camera ray by camera ray."""
         types = self.tracer.scene.types
-        number = lane // pixels
-        pixel = first_pixel + lane - number * pixels
-        which = number // sharing
-        start = number - which * sharing
-        seed = seed + which
+        number = lane // work.pixels
+        pixel = work.first_pixel + lane - number * work.pixels
+        which = number // work.sharing
+        seed, start = work.seed + which, number - which * work.sharing
 
-        def add_sample(
-            i: UInt32, total: Array3f64, rays: UInt32, non_finite: UInt32
-        ) -> tuple[UInt32, Array3f64, UInt32, UInt32]:
-            radiance, traced = self._sample(self.sampler(pixel, first_sample + i, seed))
-            x, y, z = (dr.isfinite(channel) for channel in radiance)
-            return (
-                i + sharing,
-                total + types.Array3f64(radiance),
-                rays + traced,
-                non_finite + dr.select(x & y & z, 0, 1),
-            )
+        def sampler(index: UInt32) -> Sampler:
+            return self.sampler(pixel, index, seed)
+
+        def add_ray(ray: UInt32, *totals: Any) -> tuple[Any, ...]:
+            first = self._first_vertex(sampler(work.first_ray + ray))
+
+            def add_path(sample: UInt32, *totals: Any) -> tuple[Any, ...]:
+                index = work.first_ray * work.paths + sample
+                traced = self.tracer.follow(first, sampler(index))
+                return sample + 1, *_Totals(*totals).plus(*traced)
+
+            if self.paths_per_ray == 1:
+                return ray + work.sharing, *add_path(ray, *totals)[1:]
+            begin = dr.maximum(ray * work.paths, work.skipped)
+            end = dr.minimum((ray + 1) * work.paths, work.stop)
+            once = _Totals(*totals)
+            once = once._replace(rays=once.rays + first.path.rays)
+            first = first._replace(path=first.path._replace(rays=types.UInt32(0)))
+            state: tuple[Any, ...] = (begin, *once)
+            sums = dr.while_loop(state, lambda sample, *_: sample < end, add_path)[1:]
+            return ray + work.sharing, *sums
 
         zeros = (dr.zeros(t, len(lane)) for t in (types.Array3f64, types.UInt32, types.UInt32))
-        return dr.while_loop((start, *zeros), lambda i, *_: i < samples, add_sample)[1:]
+        state: tuple[Any, ...] = (start, *zeros)
+        is_left = lambda ray, *_: ray * work.paths < work.stop  # noqa: E731
+        return _Totals(*dr.while_loop(state, is_left, add_ray)[1:])
 
-    def _sample(self, sampler: Sampler) -> tuple[Array3f, UInt32]:
+    def _first_vertex(self, sampler: Sampler) -> Vertex:
         middle = self.tracer.scene.types.Float32(0.5)
         offset = sampler.next_2d(0) if self.jitter else vec2(middle, middle)
-        return self.tracer.trace(self.camera.ray(sampler.pixel, offset), sampler)
+        return self.tracer.first_vertex(self.camera.ray(sampler.pixel, offset), sampler)
 
     def operations(self) -> int:
         """Dr.Jit's count of the operations in the kernel."""
@@ -145,9 +191,19 @@ class Launcher:
 
 
 def make_launcher(
-    types: ModuleType, scene: Scene, bounces: int, mode: Mode, sampler: str, *, jitter: bool
+    types: ModuleType,
+    scene: Scene,
+    bounces: int,
+    mode: Mode,
+    sampler: str,
+    *,
+    jitter: bool,
+    share_rays: bool = False,
 ) -> Launcher:
-    """Put a scene on the device of the backend ``types``, for kernels with what it needs."""
+    """Put a scene on the device of the backend ``types``, for kernels with what it needs.
+
+    ``share_rays`` lets paths share their camera rays where they lose little by it.
+    """
     primitives = make_primitives(scene)
     if len(primitives.triangles) or len(primitives.light_corners) > len(primitives.light_facets):
         types = import_module(f"{types.__name__}.ad")  # Mitsuba's, for its meshes
@@ -156,7 +212,8 @@ def make_launcher(
         bounces = 0
     tracer = Tracer(upload(primitives, types), features, mode, bounces)
     camera = make_camera(scene.camera, primitives.origin, types)
-    return Launcher(tracer, camera, SAMPLERS[sampler], jitter)
+    paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
+    return Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray)
 
 
 def _seed_word(seed: int) -> int:

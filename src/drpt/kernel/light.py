@@ -7,17 +7,30 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import drjit as dr
 
 from drpt.kernel.vec import frame, vec3
-from drpt.kernel.warp import TWO_PI, square_to_cone, square_to_sphere, square_to_triangle
+from drpt.kernel.warp import (
+    TWO_PI,
+    square_to_cone,
+    square_to_projected_cap,
+    square_to_sphere,
+    square_to_triangle,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from drjit.auto import Array2f, Array3f, Float, UInt32
+    from drjit.auto import Array2f, Array3f, Bool, Float, UInt32
 
     from drpt.kernel.camera import Ray
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features, Mode
     from drpt.kernel.intersect import Hit
+
+
+class Receiver(NamedTuple):
+    """A point of a surface, and the shading normal there, on the side that is to be lit."""
+
+    point: Array3f
+    normal: Array3f
 
 
 class Aim(NamedTuple):
@@ -48,30 +61,32 @@ def choose_light(scene: DeviceScene, features: Features, u: Callable[[], Float])
 
 
 def sample_light(
-    scene: DeviceScene, features: Features, mode: Mode, point: Array3f, light: UInt32, u: Array2f
+    scene: DeviceScene, features: Features, mode: Mode, at: Receiver, light: UInt32, u: Array2f
 ) -> LightSample:
-    """Solid angle: a direction from ``point`` to a chosen light."""
+    """Solid angle: a direction from a receiver to a chosen light."""
     row = scene.radiance_row(light)
     aim = Aim(
         *_by_kind(
             scene,
             features,
             light,
-            lambda: tuple(_aim_at_sphere(scene, mode, point, light, u)),
-            lambda: tuple(_aim_at_triangle(scene, point, light, u)),
+            lambda: tuple(_aim_at_sphere(scene, mode, at, light, u)),
+            lambda: tuple(_aim_at_triangle(scene, at.point, light, u)),
         )
     )
     radiance = vec3(row[0], row[1], row[2])
     return LightSample(aim.direction, aim.distance, radiance, aim.inverse_pdf * row[3])
 
 
-def inverse_pdf(scene: DeviceScene, features: Features, ray: Ray, light: UInt32, hit: Hit) -> Float:
-    """1 / density with which :func:`sample_light`, sampling cones, finds the ray to a hit."""
+def inverse_pdf(
+    scene: DeviceScene, features: Features, at: Receiver, light: UInt32, ray: Ray, hit: Hit
+) -> Float:
+    """1 / density with which :func:`sample_light`, sampling caps, finds a receiver's ray."""
     return scene.radiance_row(light)[3] * _by_kind(
         scene,
         features,
         light,
-        lambda: TWO_PI * _cap(scene, ray.origin, light).height,
+        lambda: _cap(scene, at, light).inverse_pdf(dr.dot(at.normal, ray.direction)),
         lambda: _area(scene, light) * -dr.dot(hit.normal, ray.direction) / dr.square(hit.distance),
     )
 
@@ -92,51 +107,72 @@ def _by_kind(
 
 
 class _Cap(NamedTuple):
-    """The part of a sphere light that a point sees: axis, distance, radius and cap height.
+    """The part of a sphere light that a receiver sees, on the unit sphere of directions.
 
-    The height is 1 − cos θ_max on the unit sphere of directions, 0 from inside, where the light
-    is dark. The power of the point, d² − r², is summed up without the rounding of d: close to the
-    light it decides how much of its horizon is seen.
+    The half-angle σ of its cone is given by ``sine`` and ``height``, 1 − cos σ; both are 0 from
+    inside the light, where it is dark. ``cosine`` is that of the incidence ω of its centre.
+
+    Where the whole cap is above the receiver's horizon, its projection to the receiver's plane is
+    an ellipse of the area π sin²σ cos ω. Directions are uniform there, so that a diffuse surface
+    gets the same light from each of them (Nusselt's analogue; Ureña & Georgiev 2018). Elsewhere
+    directions are uniform in the cone.
     """
 
     axis: Array3f
     distance: Float
     radius: Float
+    sine: Float
     height: Float
+    cosine: Float
+
+    @property
+    def above(self) -> Bool:
+        """Whether no part of it is below the horizon."""
+        return (self.cosine >= self.sine) & (self.cosine > 0)
+
+    def inverse_pdf(self, cosine: Float) -> Float:
+        """1 / density of a direction, given the cosine of its incidence."""
+        projected = dr.pi * self.sine * self.sine * self.cosine
+        return dr.select(self.above, projected / cosine, TWO_PI * self.height)
 
 
-def _cap(scene: DeviceScene, point: Array3f, light: UInt32) -> _Cap:
+def _cap(scene: DeviceScene, at: Receiver, light: UInt32) -> _Cap:
+    """The power of the point, d² − r², is summed up without the rounding of d.
+
+    Close to the light it decides how much of its horizon is seen.
+    """
     row = scene.geometry_row(scene.first_light + light)
-    to_center = vec3(row[0], row[1], row[2]) - point
+    to_center = vec3(row[0], row[1], row[2]) - at.point
     radius = row[3]
     distance = dr.norm(to_center)
     scale = dr.rcp(distance)
-    sine = radius * scale
     power = dr.fma(to_center.x, to_center.x, -radius * radius)
     power = dr.fma(to_center.z, to_center.z, dr.fma(to_center.y, to_center.y, power))
-    cosine = dr.sqrt(power) * scale
-    height = dr.select(power > 0, sine * sine / (1 + cosine), 0)
-    return _Cap(to_center * scale, distance, radius, height)
+    sine = dr.select(power > 0, radius * scale, 0)
+    height = dr.select(power > 0, sine * sine / (1 + dr.sqrt(power) * scale), 0)
+    axis = to_center * scale
+    return _Cap(axis, distance, radius, sine, height, dr.dot(axis, at.normal))
 
 
-def _aim_at_sphere(
-    scene: DeviceScene, mode: Mode, point: Array3f, light: UInt32, u: Array2f
-) -> Aim:
+def _aim_at_sphere(scene: DeviceScene, mode: Mode, at: Receiver, light: UInt32, u: Array2f) -> Aim:
     if mode.samples_cones:
-        return _aim_into_cone(_cap(scene, point, light), u)
+        return _aim_at_cap(_cap(scene, at, light), at.normal, u)
     row = scene.geometry_row(scene.first_light + light)
     normal = square_to_sphere(u)
     radius = row[3]
     target = dr.fma(normal, radius, vec3(row[0], row[1], row[2]))
-    return _aim_at_point(point, target, normal, _area(scene, light))
+    return _aim_at_point(at.point, target, normal, _area(scene, light))
 
 
-def _aim_into_cone(cap: _Cap, u: Array2f) -> Aim:
-    local = square_to_cone(u, cap.height)
+def _aim_at_cap(cap: _Cap, normal: Array3f, u: Array2f) -> Aim:
+    basis = frame(cap.axis)
+    local_normal = basis.to_local(normal)
+    lifted, cosine = square_to_projected_cap(u, cap.sine, cap.height, local_normal)
+    local = dr.select(cap.above, lifted, square_to_cone(u, cap.height))
     side = cap.distance * dr.sqrt(dr.square(local.x) + dr.square(local.y))
     depth = dr.sqrt(dr.maximum((cap.radius - side) * (cap.radius + side), 0))
     distance = cap.distance * local.z - depth
-    return Aim(frame(cap.axis).to_world(local), distance, TWO_PI * cap.height)
+    return Aim(basis.to_world(local), distance, cap.inverse_pdf(cosine))
 
 
 def _aim_at_triangle(scene: DeviceScene, point: Array3f, light: UInt32, u: Array2f) -> Aim:

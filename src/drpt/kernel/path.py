@@ -25,7 +25,13 @@ import drjit as dr
 from drpt.kernel.brdf import Brdf, make_brdf
 from drpt.kernel.camera import Ray
 from drpt.kernel.intersect import Hit, closest_hit, occluded
-from drpt.kernel.light import choose_light, inverse_pdf, power_heuristic, sample_light
+from drpt.kernel.light import (
+    Receiver,
+    choose_light,
+    inverse_pdf,
+    power_heuristic,
+    sample_light,
+)
 from drpt.kernel.vec import vec3
 from drpt.kernel.warp import sphere_pdf, square_to_sphere
 
@@ -48,9 +54,18 @@ class Path(NamedTuple):
     direction: Array3f
     active: Bool  # whether there is a next vertex
     beta: Array3f  # throughput up to it
+    normal: Array3f  # shading normal where the ray starts, for MIS
     pdf: Float  # density of the direction by the BRDF, for MIS
     radiance: Array3f  # collected so far
     rays: UInt32  # traced so far
+
+
+class Vertex(NamedTuple):
+    """A path that has reached a vertex and collected its light; ``hit`` is valid if it goes on."""
+
+    path: Path
+    hit: Hit
+    brdf: Brdf
 
 
 @dataclass
@@ -62,21 +77,29 @@ class Tracer:
     mode: Mode
     bounces: int
 
-    def trace(self, ray: Ray, sampler: Sampler) -> tuple[Array3f, UInt32]:
-        """Radiance (W/(m² sr), three channels) along camera rays, and how many rays it took."""
+    def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
+        """What camera rays meet, and the light that it sends."""
         types = self.scene.types
         path = Path(
             origin=ray.origin,
             direction=ray.direction,
             active=types.Bool(True),
             beta=types.Array3f(1),
+            normal=types.Array3f(0),
             pdf=types.Float32(0),
             radiance=types.Array3f(0),
             rays=types.UInt32(0),
         )
+        return self._arrive(path, sampler, 0)
+
+    def follow(self, first: Vertex, sampler: Sampler) -> tuple[Array3f, UInt32]:
+        """Radiance (W/(m² sr), three channels) of whole paths on from a first vertex, and rays."""
+        if self._vertices <= 1:
+            return first.path.radiance, first.path.rays
+        path = self._leave(first, sampler, 0)
         unrolled = min(self._vertices, UNROLLED_VERTICES)
-        for depth in range(unrolled):
-            path = self._vertex(path, sampler, depth)
+        for depth in range(1, unrolled):
+            path = self._step(path, sampler, depth)
         if unrolled < self._vertices:
             path = self._loop(path, sampler, unrolled)
         return path.radiance, path.rays
@@ -88,7 +111,7 @@ class Tracer:
             return Path(*path).active & (depth < self._vertices)
 
         def step(depth: UInt32, *path: Any) -> tuple[Any, ...]:
-            return depth + 1, *self._vertex(Path(*path), sampler, depth)
+            return depth + 1, *self._step(Path(*path), sampler, depth)
 
         state: tuple[Any, ...] = (self.scene.types.UInt32(first), *path)
         return Path(*dr.while_loop(state, goes_on, step)[1:])
@@ -100,8 +123,13 @@ class Tracer:
             return 0
         return self.bounces + 1 if self.bounces == 0 or self.mode.counts_hits else self.bounces
 
-    def _vertex(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Path:
-        """Find the next vertex, collect the light that it sends, and choose where to go on."""
+    def _step(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Path:
+        vertex = self._arrive(path, sampler, depth)
+        is_last = isinstance(depth, int) and depth == self._vertices - 1
+        return vertex.path if is_last else self._leave(vertex, sampler, depth)
+
+    def _arrive(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Vertex:
+        """Find the next vertex, and collect the light that it sends."""
         scene, features = self.scene, self.features
         ray = Ray(path.origin, path.direction)
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
@@ -109,26 +137,28 @@ class Tracer:
         hit = closest_hit(scene, features, ray, path.active, from_camera=is_first)
         if is_first or self.mode.counts_hits:
             weighted = features.mis and not is_first
-            emitted = self._emission(ray, hit, path.pdf if weighted else None)
-            radiance = radiance + path.beta * emitted
-        if isinstance(depth, int) and depth == self.bounces:
-            return path._replace(radiance=radiance, rays=rays)
+            radiance = radiance + path.beta * self._emission(path, hit, weighted=weighted)
         reflects = hit.primitive < scene.first_light
         hit = hit._replace(valid=hit.valid & reflects & (depth < self.bounces))
         brdf = make_brdf(scene, features, hit, -ray.direction)
-        if features.direct_light:
+        if features.direct_light and not (isinstance(depth, int) and depth == self.bounces):
             light, traced = self._direct(hit, brdf, sampler, depth)
             radiance = radiance + path.beta * light
             rays = rays + dr.select(traced, 1, 0)
-        if isinstance(depth, int) and depth == self._vertices - 1:
-            return path._replace(radiance=radiance, rays=rays)
+        return Vertex(path._replace(radiance=radiance, rays=rays), hit, brdf)
+
+    def _leave(self, vertex: Vertex, sampler: Sampler, depth: int | UInt32) -> Path:
+        """Choose where a path goes on."""
+        path, hit, brdf = vertex
         direction, weight = self._next_direction(brdf, sampler, depth)
         beta = path.beta * weight
         active = hit.valid & ~(dr.max(beta) <= 0)  # not a number goes on, to be counted
-        pdf = brdf.pdf(direction) if features.mis else path.pdf
-        return Path(hit.point, direction, active, beta, pdf, radiance, rays)
+        path = path._replace(origin=hit.point, direction=direction, active=active, beta=beta)
+        if not self.features.mis:
+            return path
+        return path._replace(normal=hit.shading_normal, pdf=brdf.pdf(direction))
 
-    def _emission(self, ray: Ray, hit: Hit, pdf: Float | None) -> Array3f:
+    def _emission(self, path: Path, hit: Hit, *, weighted: bool) -> Array3f:
         """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
         scene = self.scene
         lit = hit.valid & (hit.primitive >= scene.first_light) & hit.front
@@ -137,9 +167,10 @@ class Tracer:
             light = dr.select(lit, hit.primitive - scene.first_light, 0)
         row = scene.radiance_row(light)
         radiance = vec3(row[0], row[1], row[2])
-        if pdf is not None:
-            density = 1 / inverse_pdf(scene, self.features, ray, light, hit)
-            radiance = radiance * power_heuristic(density / pdf)
+        if weighted:
+            at, ray = Receiver(path.origin, path.normal), Ray(path.origin, path.direction)
+            inverse = inverse_pdf(scene, self.features, at, light, ray, hit)
+            radiance = radiance * power_heuristic(1 / (inverse * path.pdf))
         return dr.select(lit, radiance, 0)
 
     def _direct(
@@ -149,7 +180,8 @@ class Tracer:
         scene, features = self.scene, self.features
         light = choose_light(scene, features, lambda: sampler.next_1d(_decision(depth, 0)))
         u = sampler.next_2d(_decision(depth, 1))
-        sample = sample_light(scene, features, self.mode, hit.point, light, u)
+        at = Receiver(hit.point, hit.shading_normal)
+        sample = sample_light(scene, features, self.mode, at, light, u)
         value = brdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
         if features.mis:
             value *= power_heuristic(brdf.pdf(sample.direction) * sample.inverse_pdf)

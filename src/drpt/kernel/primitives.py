@@ -7,6 +7,7 @@ spheres that emit, triangles that emit. So "is a sphere" and "is a light" are ra
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -119,6 +120,7 @@ class Primitives:
         """Whether each facet can stand between two points of the scene."""
         return [not bounds(facet, *self._balls()) for facet in self.facets]
 
+    @cached_property
     def solids(self) -> tuple[Solid, ...]:
         """The convex bodies among the facets."""
         return make_solids([facet.corners for facet in self.facets], *self._balls())

@@ -37,6 +37,10 @@ class Frame(NamedTuple):
         """Coordinates ``v`` in this basis, in world space."""
         return dr.fma(self.s, v.x, dr.fma(self.t, v.y, self.n * v.z))
 
+    def to_local(self, v: Array3f) -> Array3f:
+        """Coordinates in this basis of a vector in world space."""
+        return vec3(dr.dot(self.s, v), dr.dot(self.t, v), dr.dot(self.n, v))
+
 
 def frame(n: Array3f) -> Frame:
     """Basis around the unit vector ``n``, continuous but for the sign of n.z.

@@ -65,6 +65,25 @@ def cone_pdf(height: Float) -> Float:
     return INV_TWO_PI * dr.rcp(height)
 
 
+def square_to_projected_cap(
+    u: Array2f, sine: Float, height: Float, normal: Array3f
+) -> tuple[Array3f, Float]:
+    """Projected solid angle, spherical cap around +z above the horizon of ``normal``: uniform.
+
+    Also the cosine at the normal. The cap is given by the sine of its half-angle σ and its height,
+    1 − cos σ. Points uniform on the flat disc that closes it, cos σ above the centre, are moved
+    along the normal up to the sphere. That keeps their projection, which maps the disc linearly;
+    it adds |q|² + 2 λ q·n + λ² = 1, where |q|² = 1 − sin²σ (1 − u) on the disc, nothing cancels.
+    """
+    sin_phi, cos_phi = sincos_2pi(u.y)
+    radius = sine * dr.sqrt(u.x)
+    disc = vec3(radius * cos_phi, radius * sin_phi, 1 - height)
+    below = dr.dot(disc, normal)
+    missing = sine * sine * (1 - u.x)
+    cosine = dr.sqrt(dr.fma(below, below, missing))
+    return dr.fma(normal, missing / (below + cosine), disc), cosine
+
+
 def square_to_phong_lobe(u: Array2f, exponent: Float) -> Array3f:
     """Solid angle, hemisphere around +z: proportional to cos^α θ.
 
