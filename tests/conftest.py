@@ -4,11 +4,20 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from drpt.kernel import backend
 from tests.oracle.arrays import Floats
 
 TYPES = backend.load()
+
+
+@pytest.fixture(autouse=True)
+def _forget_shapes() -> None:
+    """Let no test see shapes that another one has prepared with other constants."""
+    from drpt.kernel.launch import prepare
+
+    prepare.cache_clear()
 
 
 def to_device(values: npt.ArrayLike) -> Any:

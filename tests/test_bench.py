@@ -120,7 +120,7 @@ def test_generated_scenes_are_lit(scene: Scene) -> None:
 
 
 def test_lights_can_be_chosen_alike() -> None:
-    primitives = make_primitives(lanterns(8))
+    primitives = make_primitives(lanterns(8).shapes)
     weighted = primitives.light_cdf()
     with uniform_choice():
         np.testing.assert_array_equal(primitives.light_cdf(), np.arange(1, 9) / 8)

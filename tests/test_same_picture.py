@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import drpt
+from drpt.kernel.launch import prepare
 from tests.measuring import with_radiance
 from tests.test_modes import small_scene
 
@@ -84,6 +85,7 @@ def test_triangles_in_embree_and_unrolled(mode: str, monkeypatch: pytest.MonkeyP
     plain = drpt.render(small_scene(), SPP, BOUNCES, mode)
     monkeypatch.setattr("drpt.kernel.primitives.UNROLL_LIMIT", 0)
     monkeypatch.setattr("drpt.kernel.device_scene.UNROLL_LIMIT", 0)
+    prepare.cache_clear()
     assert_same(drpt.render(small_scene(), SPP, BOUNCES, mode), plain)
 
 

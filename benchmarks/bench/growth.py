@@ -15,6 +15,7 @@ from benchmarks.bench.scenes import lanterns, resized
 from benchmarks.bench.timing import alternate, median_seconds, start
 from drpt import Mode, Scene, load_scene
 from drpt.crosscheck import measure
+from drpt.kernel.launch import prepare
 from drpt.kernel.primitives import Primitives
 
 if TYPE_CHECKING:
@@ -64,8 +65,10 @@ def uniform_choice() -> Iterator[None]:
         return np.round(np.arange(1, count + 1) / count * 2**24) / 2**24
 
     asked: list[Primitives] = []
+    prepare.cache_clear()
     with patch.object(Primitives, "light_cdf", even):
         yield
+    prepare.cache_clear()
     if not asked:
         raise RuntimeError("lights are chosen by something else than Primitives.light_cdf")
 

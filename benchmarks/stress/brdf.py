@@ -63,7 +63,7 @@ def _brdf(exponent: float, theta: float) -> Brdf:
     """One point with the normal +z, seen at the angle θ from it."""
     material = Phong(ALBEDO, exponent)
     shapes = [Sphere((0, 0, 0), 1, material=material), Sphere((0, 0, 5), 1, radiance=1)]
-    primitives = make_primitives(Scene(camera_at((0, 0, 9), (0, 0, 0)), shapes))
+    primitives = make_primitives(Scene(camera_at((0, 0, 9), (0, 0, 0)), shapes).shapes)
     features = Features.of(primitives, 1, Mode.MIS)
     normal, view = to_device([[0, 0, 1]]), to_device([[sin(theta), 0, cos(theta)]])
     albedo, exponents = to_device([material.albedo]), to_device([exponent])

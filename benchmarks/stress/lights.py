@@ -54,7 +54,7 @@ def relative(found: float, expected: float) -> float:
 
 def in_drpt(light: Sphere, normal: Floats, samples: int) -> float:
     """Irradiance at the origin, by samples of the light alone."""
-    primitives = make_primitives(Scene(camera_at((0, 0, 5), ORIGIN), [FLOOR, light]))
+    primitives = make_primitives(Scene(camera_at((0, 0, 5), ORIGIN), [FLOOR, light]).shapes)
     scene = upload(primitives, TYPES)
     features = Features.of(primitives, 1, Mode.EXPLICIT)
     at = Receiver(to_device([ORIGIN - primitives.origin]), to_device([normal]))

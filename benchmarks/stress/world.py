@@ -46,7 +46,7 @@ class Drpt:
         scene = Scene(camera_at((0, 0, 9), (0, 0, 0)), shapes)
         launcher = make_launcher(TYPES, scene, 1, Mode.MIS, "independent", jitter=False)
         self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
-        if make_primitives(scene).origin.any():
+        if make_primitives(scene.shapes).origin.any():
             raise ValueError("shapes: they are so far aside that the kernel's origin moves along")
 
     def closest(self, origins: Floats, directions: Floats) -> Found:

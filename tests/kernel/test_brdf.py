@@ -273,7 +273,7 @@ def test_make_brdf_takes_the_material_of_the_primitive_that_is_hit() -> None:
     materials: list[Material] = [Diffuse((0.1, 0.2, 0.3)), Phong((0.4, 0.5, 0.6), 7)]
     shapes = [Sphere((x, 0, 0), 0.4, material=m) for x, m in enumerate(materials)]
     scene = upload(
-        make_primitives(Scene(camera, [*shapes, Sphere((0, 9, 0), 1, radiance=1)])), TYPES
+        make_primitives(Scene(camera, [*shapes, Sphere((0, 9, 0), 1, radiance=1)]).shapes), TYPES
     )
     n, distance, yes = to_device([[0, 0, 1]] * 3), to_device([1, 1, 1]), TYPES.Bool([True] * 3)
     hit = Hit(TYPES.Bool([True, True, False]), distance, TYPES.UInt32([0, 1, 0]), n, n, n, yes)

@@ -37,7 +37,7 @@ COURSE_NAMES = {
 
 def features(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> set[str]:
     """Names of the features that the kernel of a scene has."""
-    primitives = make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes))
+    primitives = make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes).shapes)
     found = asdict(Features.of(primitives, bounces, Mode(mode)))
     return {name for name, on in found.items() if on}
 

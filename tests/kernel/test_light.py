@@ -69,7 +69,7 @@ class Lights:
 
     @classmethod
     def of(cls, *lights: Shape, mode: Mode = Mode.MIS) -> "Lights":
-        primitives = make_primitives(Scene(CAMERA, [FLOOR, *lights]))
+        primitives = make_primitives(Scene(CAMERA, [FLOOR, *lights]).shapes)
         return cls(upload(primitives, TYPES), Features.of(primitives, 1, mode), mode)
 
     def sample(

@@ -32,7 +32,7 @@ QUAD = [[0, 1, 2], [0, 2, 3]]
 
 
 def prepare(*shapes: Shape) -> Primitives:
-    return make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes))
+    return make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes).shapes)
 
 
 def quad(z: float = 0.0, **kwargs: Any) -> drpt.Mesh:
@@ -105,7 +105,7 @@ def test_a_quad_is_one_facet_and_meshes_stay_apart() -> None:
 
 
 def test_cornell_box_needs_sixteen_facets() -> None:
-    found = make_primitives(drpt.load_scene("cornell-box"))
+    found = make_primitives(drpt.load_scene("cornell-box").shapes)
     assert len(found.facets) == 4 + 2 + 5 + 5  # the red wall is not planar
     red = found.reflectance[:, 0] > 2 * found.reflectance[:, 1]
     assert red[: found.first_smooth].sum() == 2
@@ -133,7 +133,7 @@ def test_triangles_without_area_are_dropped(kind: str) -> None:
 
 def test_origin_is_zero_unless_the_scene_is_far_from_it() -> None:
     assert not prepare(quad(material=WHITE)).origin.any()
-    assert not make_primitives(drpt.load_scene("cornell-box")).origin.any()
+    assert not make_primitives(drpt.load_scene("cornell-box").shapes).origin.any()
 
 
 @pytest.mark.parametrize("shift", [1e3, -1e5, 12345678.0])
@@ -187,7 +187,7 @@ def surface_points(rng: np.random.Generator, shapes: Sequence[Shape], count: int
 )
 def test_facets_said_to_cast_no_shadow_never_do(name: str, bounding: int) -> None:
     scene = drpt.load_scene(name)
-    found = make_primitives(scene)
+    found = make_primitives(scene.shapes)
     silent = [f for f, b in zip(found.facets, found.blockers(), strict=True) if not b]
     assert len(silent) == bounding
     rng = np.random.default_rng(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from drpt.kernel.camera import DeviceCamera, make_camera
 from drpt.kernel.denormals import flush_denormals
-from drpt.kernel.device_scene import upload
+from drpt.kernel.device_scene import DeviceScene, upload
 from drpt.kernel.estimator import Features
 from drpt.kernel.path import Tracer
 from drpt.kernel.primitives import make_primitives
@@ -26,8 +27,9 @@ if TYPE_CHECKING:
 
     from drpt.kernel.estimator import Mode
     from drpt.kernel.path import Vertex
+    from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
-    from drpt.scene import Scene
+    from drpt.scene import Scene, Shape
 
 
 PATHS_PER_RAY = 4
@@ -204,16 +206,23 @@ def make_launcher(
 
     ``share_rays`` lets paths share their camera rays where they lose little by it.
     """
-    primitives = make_primitives(scene)
-    if len(primitives.triangles) or len(primitives.light_corners) > len(primitives.light_facets):
-        types = import_module(f"{types.__name__}.ad")  # Mitsuba's, for its meshes
+    primitives, device_scene = prepare(scene.shapes, types)
     features = Features.of(primitives, bounces, mode)
     if not (features.diffuse or features.phong):
         bounces = 0
-    tracer = Tracer(upload(primitives, types), features, mode, bounces)
-    camera = make_camera(scene.camera, primitives.origin, types)
+    tracer = Tracer(device_scene, features, mode, bounces)
+    camera = make_camera(scene.camera, primitives.origin, device_scene.types)
     paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
     return Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray)
+
+
+@lru_cache(maxsize=1)
+def prepare(shapes: tuple[Shape, ...], types: ModuleType) -> tuple[Primitives, DeviceScene]:
+    """Primitives of shapes, on the host and on the device: kept for the next render of them."""
+    primitives = make_primitives(shapes)
+    if len(primitives.triangles) or len(primitives.light_corners) > len(primitives.light_facets):
+        types = import_module(f"{types.__name__}.ad")  # Mitsuba's, for its meshes
+    return primitives, upload(primitives, types)
 
 
 def _seed_word(seed: int) -> int:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from drpt.kernel.facets import Facet
     from drpt.kernel.solids import Solid
-    from drpt.scene import Scene, Shape
+    from drpt.scene import Shape
 
     Array: TypeAlias = NDArray[np.float64]
 
@@ -134,11 +134,11 @@ class Primitives:
         return points, radii
 
 
-def make_primitives(scene: Scene) -> Primitives:
-    """Primitives of a scene."""
-    origin = _origin(scene.shapes)
-    meshes = [shape for shape in scene.shapes if isinstance(shape, Mesh)]
-    spheres = [shape for shape in scene.shapes if isinstance(shape, Sphere)]
+def make_primitives(shapes: tuple[Shape, ...]) -> Primitives:
+    """Primitives of the shapes of a scene."""
+    origin = _origin(shapes)
+    meshes = [shape for shape in shapes if isinstance(shape, Mesh)]
+    spheres = [shape for shape in shapes if isinstance(shape, Sphere)]
     flat = [_part(m, origin) for m in meshes if not m.is_light and m.normals is None]
     smooth = [_part(m, origin) for m in meshes if not m.is_light and m.normals is not None]
     dull_spheres = [_Part(s, _row(s, origin)) for s in spheres if not s.is_light]
