@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import drjit as dr
 
 from drpt.kernel.device_scene import Ball
-from drpt.kernel.vec import types_of, vec3
+from drpt.kernel.vec import greater, lesser, types_of, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -161,10 +161,10 @@ def _meet_solid(ray: Ray, solid: Solid, *, inside: bool) -> tuple[UInt32, Bool, 
 
     A ray that is known to start ``inside`` leaves even where rounding has put its origin outside.
     """
-    crossings = [_cross(ray, span) for span in solid.spans]
-    met, t = _surface_of(crossings, inside=inside)
+    passage = _pass(ray, solid.spans)
+    met, t = _surface_of(passage, inside=inside)
     number = types_of(t).UInt32(0)
-    for face, at in _faces(crossings):
+    for face, at in passage.faces:
         if face.facet is not None:
             number = dr.select(at == t, face.facet, number)
     return number, met, t
@@ -172,70 +172,56 @@ def _meet_solid(ray: Ray, solid: Solid, *, inside: bool) -> tuple[UInt32, Bool, 
 
 def _blocks(ray: Ray, solid: Solid, distance: Float) -> Bool:
     """Whether a convex body stands on the first ``distance`` of a ray between two surfaces."""
-    met, t = _surface_of([_cross(ray, span) for span in solid.shading], inside=False)
+    met, t = _surface_of(_pass(ray, solid.shading), inside=False)
     return met & (t < distance)
 
 
-def _surface_of(crossings: list[_Crossing], *, inside: bool) -> tuple[Bool, Float]:
-    """Whether and where a ray enters a convex body by its surface, or else leaves it by that."""
-    leaves = _least(crossing.leaves for crossing in crossings)
-    openings = [at for face, at in _faces(crossings) if face.facet is None]
-    met, t = types_of(leaves).Bool(True), leaves
-    if not inside:
-        enters = _greatest(crossing.enters for crossing in crossings)
-        met = (enters <= leaves) & (leaves > 0)
-        by_surface = _all(enters > 0, (at != enters for at in openings))
-        t = dr.select(by_surface, enters, leaves)
-    return _all(met, (at != t for at in openings)), t
-
-
-class _Crossing(NamedTuple):
-    """Where a ray enters and leaves a span, and where it meets each of its faces."""
+class _Passage(NamedTuple):
+    """Where a ray enters and leaves a convex body, and where it meets the plane of each face."""
 
     enters: Any
     leaves: Any
     faces: list[tuple[Face, Float]]
 
 
-def _cross(ray: Ray, span: Span) -> _Crossing:
-    """The span's crossing; what is not a number, where a ray runs in a plane, compares as False."""
-    rate = dr.rcp(_dot(span.direction, ray.direction))
-    position = _dot(span.direction, ray.origin)
-    upward = rate > 0
-    low, high = (
-        None if face is None else (face, (face.offset - position) * rate)
-        for face in (span.low, span.high)
-    )
-    return _Crossing(
-        enters=dr.select(upward, low[1] if low else -dr.inf, high[1] if high else -dr.inf),
-        leaves=dr.select(upward, high[1] if high else dr.inf, low[1] if low else dr.inf),
-        faces=[end for end in (low, high) if end],
-    )
+def _pass(ray: Ray, spans: tuple[Span, ...]) -> _Passage:
+    """The part of a ray that is on the inner side of all planes.
+
+    A distance is not a number where a ray runs in a plane; comparisons pass over that.
+    """
+    enters: Any = -dr.inf
+    leaves: Any = dr.inf
+    faces: list[tuple[Face, Float]] = []
+    for span in spans:
+        rate = dr.rcp(_dot(span.direction, ray.direction))
+        position = _dot(span.direction, ray.origin)
+        upward = rate > 0
+        for face, enters_here in ((span.low, upward), (span.high, ~upward)):
+            if face is None:
+                continue
+            at = (face.offset - position) * rate
+            enters = dr.select(enters_here, greater(at, enters), enters)
+            leaves = dr.select(enters_here, leaves, lesser(at, leaves))
+            faces.append((face, at))
+    return _Passage(enters, leaves, faces)
 
 
-def _faces(crossings: list[_Crossing]) -> Iterator[tuple[Face, Float]]:
-    for crossing in crossings:
-        yield from crossing.faces
+def _surface_of(passage: _Passage, *, inside: bool) -> tuple[Bool, Float]:
+    """Whether and where a ray enters a convex body by its surface, or else leaves it by that."""
+    enters, leaves, faces = passage
+    openings = [at for face, at in faces if face.facet is None]
+    met, t = types_of(leaves).Bool(True), leaves
+    if not inside:
+        by_surface = _all(enters > 0, [at != enters for at in openings])
+        met = (enters <= leaves) & (leaves > 0)
+        t = dr.select(by_surface, enters, leaves)
+    return _all(met, [at != t for at in openings]), t
 
 
-def _all(first: Bool, others: Iterator[Bool]) -> Bool:
+def _all(first: Bool, others: list[Bool]) -> Bool:
     for condition in others:
         first = first & condition
     return first
-
-
-def _greatest(values: Iterator[Float]) -> Any:
-    found: Any = -dr.inf
-    for x in values:
-        found = dr.select(x > found, x, found)
-    return found
-
-
-def _least(values: Iterator[Float]) -> Any:
-    found: Any = dr.inf
-    for x in values:
-        found = dr.select(x < found, x, found)
-    return found
 
 
 def _meet_facet(ray: Ray, facet: Facet) -> tuple[Bool, Float]:
@@ -283,7 +269,7 @@ def _meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
     root: Any = dr.copysign(dr.sqrt(discriminant), b)
     q = b + root
     other = c / q
-    near, far = dr.minimum(q, other), dr.maximum(q, other)
+    near, far = lesser(q, other), greater(q, other)
     return (discriminant > 0) & (far > 0), dr.select(near > 0, near, far)
 
 
@@ -305,7 +291,7 @@ def _surface(
         shading_normal = _interpolated_normal(scene, point, facing, primitive, valid)
     if scene.reach is not None:
         in_mesh = valid & (primitive < scene.first_sphere)
-        reach = dr.maximum(reach, dr.gather(type(t), scene.reach, primitive, in_mesh))
+        reach = greater(reach, dr.gather(type(t), scene.reach, primitive, in_mesh))
     away = _away(scene, features, facing, ray.direction, primitive)
     spawn = dr.fma(away, SPAWN_OFFSET * reach, point)
     return Hit(valid, t, primitive, spawn, facing, shading_normal, front)
@@ -380,7 +366,7 @@ def _on_sphere_light(row: Array4f, p: Array3f) -> _Place:
 
 
 def _largest(v: Array3f) -> Float:
-    return dr.maximum(dr.maximum(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
+    return greater(greater(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
 
 
 def _interpolated_normal(

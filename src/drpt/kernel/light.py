@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
-from drpt.kernel.vec import frame, vec3
+from drpt.kernel.vec import frame, greater, vec3
 from drpt.kernel.warp import (
     TWO_PI,
     square_to_cone,
@@ -170,7 +170,7 @@ def _aim_at_cap(cap: _Cap, normal: Array3f, u: Array2f) -> Aim:
     lifted, cosine = square_to_projected_cap(u, cap.sine, cap.height, local_normal)
     local = dr.select(cap.above, lifted, square_to_cone(u, cap.height))
     side = cap.distance * dr.sqrt(dr.square(local.x) + dr.square(local.y))
-    depth = dr.sqrt(dr.maximum((cap.radius - side) * (cap.radius + side), 0))
+    depth = dr.sqrt(greater((cap.radius - side) * (cap.radius + side), 0))
     distance = cap.distance * local.z - depth
     return Aim(basis.to_world(local), distance, cap.inverse_pdf(cosine))
 
@@ -189,7 +189,7 @@ def _aim_at_point(point: Array3f, target: Array3f, normal: Array3f, area: Float)
     way = target - point
     distance = dr.norm(way)
     direction = way / distance
-    cosine = dr.maximum(-dr.dot(direction, normal), 0)
+    cosine = greater(-dr.dot(direction, normal), 0)
     return Aim(direction, distance, area * cosine / dr.square(distance))
 
 

@@ -26,6 +26,16 @@ def vec3(x: Float, y: Float, z: Float) -> Array3f:
     return types_of(x).Array3f(x, y, z)
 
 
+def greater(a: Any, b: Any) -> Any:
+    """The greater of two; b where one is not a number, so that it takes a single instruction."""
+    return dr.select(a > b, a, b)
+
+
+def lesser(a: Any, b: Any) -> Any:
+    """The lesser of two; b where one is not a number."""
+    return dr.select(a < b, a, b)
+
+
 class Frame(NamedTuple):
     """Right-handed orthonormal basis (s, t, n)."""
 
