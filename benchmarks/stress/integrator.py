@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -181,6 +182,20 @@ def closed_room(name: str, shape: Callable[[Floats, float], Mesh]) -> Case:
     )
 
 
+def right_angled_room(name: str, shape: Callable[[Floats, float], Mesh]) -> tuple[Case, Case]:
+    """The same of a room whose corners are known to leak, from far away on."""
+    near = replace(closed_room(name, shape), values=OFFSETS[:3], quick=(0.1, 10.0))
+    far = replace(
+        near,
+        name=f"{near.name}, far away",
+        values=OFFSETS[3:],
+        quick=(1e3,),
+        bound=1e-5,
+        reason="the limit: rounding may put a vertex in a corner behind the other wall",
+    )
+    return near, far
+
+
 POWERS = tuple(2.0**n for n in (-20, -10, -3, 3, 10, 20))
 BITS = "a power of two changes no digit"
 SCALE = "scene-wide epsilons do not scale along"
@@ -296,6 +311,6 @@ CASES = (
     ),
     closed_room("icosahedron", lambda center, size: icosphere(0, center, size)),
     closed_room("20480 triangles", lambda center, size: icosphere(5, center, size)),
-    closed_room("cube", cube),
-    closed_room("cube of needles 1e6 : 1", lambda center, size: cube(center, size, NEEDLES)),
+    *right_angled_room("cube", cube),
+    *right_angled_room("cube of needles 1e6 : 1", lambda c, size: cube(c, size, NEEDLES)),
 )
