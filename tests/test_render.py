@@ -325,13 +325,13 @@ def test_a_sample_that_is_not_finite_is_named_and_can_be_traced_again(
     monkeypatch.setattr(Tracer, "follow", broken)
     monkeypatch.setattr(MODULE, "LAUNCH_PATHS", 16 * SCENE.camera.width * SCENE.camera.height)
     monkeypatch.setattr(MODULE, "LAUNCH_LANES", 4)
-    settings: Any = {"spp": 64, "mode": "explicit", "sampler": sampler, "seed": 3}
+    settings: Any = {"spp": 64, "bounces": 2, "mode": "explicit", "sampler": sampler, "seed": 3}
     with pytest.warns(RuntimeWarning, match="not finite") as caught:
         result = drpt.render(SCENE, **settings)
     assert str(caught[0].message) == result.warning
     assert result.warning == (
         "23 of 6144 samples were not finite, one of them in pixel (7, 2): "
-        f"Rendering(scene, 64, 3, 'explicit', sampler={sampler!r}, seed=3, jitter=True)"
+        f"Rendering(scene, 64, 2, 'explicit', sampler={sampler!r}, seed=3, jitter=True)"
         ".sample(7, 2, 41) traces it again"
     )
     assert result.first_non_finite == (7, 2, 41)

@@ -83,7 +83,7 @@ def test_what_modes_do(
 
 
 def test_a_scene_of_everything_has_all_features() -> None:
-    everything = set(Features.__dataclass_fields__) - {"shared_rays"}
+    everything = set(Features.__dataclass_fields__) - {"shared_rays", "regeneration"}
     assert features(BALL, TRIANGLE, SMOOTH, LAMP, PANEL) == everything
 
 

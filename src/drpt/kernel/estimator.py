@@ -68,6 +68,9 @@ class Features:
         Samples of lights of that kind.
     mis
         Weights for both ways to find a light.
+    regeneration
+        A path starts where another one has ended, instead of waiting for its neighbours: in open
+        scenes, with 3 bounces or more.
     shared_rays
         Several paths from the first vertex of one camera ray: in rooms lit by a single sphere,
         where they go on from there makes the noise, and direct light hardly any.
@@ -84,6 +87,7 @@ class Features:
     sphere_light_samples: bool
     triangle_light_samples: bool
     mis: bool
+    regeneration: bool
     shared_rays: bool
 
     @classmethod
@@ -93,7 +97,6 @@ class Features:
         reflection = emission and bounces > 0 and len(primitives.reflectance) > 0
         direct_light = reflection and mode.samples_lights
         one_sphere = len(primitives.radiance) == primitives.sphere_lights == 1
-        interior = any(solid.encloses for solid in primitives.solids)
         return cls(
             spheres=emission and len(primitives.spheres) > 0,
             triangles=emission and len(primitives.planes) > 0,
@@ -106,9 +109,10 @@ class Features:
             sphere_light_samples=direct_light and primitives.sphere_lights > 0,
             triangle_light_samples=direct_light and len(primitives.light_corners) > 0,
             mis=direct_light and mode.counts_hits,
+            regeneration=reflection and bounces > 2 and not primitives.interior,
             shared_rays=direct_light
             and mode.samples_cones
             and bounces > 1
             and one_sphere
-            and interior,
+            and primitives.interior,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -17,16 +17,15 @@ from drpt.kernel.estimator import Features
 from drpt.kernel.path import Tracer
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SAMPLERS
-from drpt.kernel.vec import vec2
+from drpt.kernel.schedule import Lanes, Totals, Work
 
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from drjit.auto import Array3f, Array3f64, UInt32
+    from drjit.auto import UInt32
     from numpy.typing import NDArray
 
     from drpt.kernel.estimator import Mode
-    from drpt.kernel.path import Vertex
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Scene, Shape
@@ -46,40 +45,6 @@ class Sums(NamedTuple):
     radiance: NDArray[np.float64]
     rays: int
     non_finite: int
-
-
-class _Work(NamedTuple):
-    """What a launch is to do: numbers, which are inputs of its kernel.
-
-    Samples count from the first path of the camera ray number ``first_ray``; so many as ``skipped``
-    are not asked for, and those from ``stop`` on.
-    """
-
-    first_pixel: Any
-    pixels: Any
-    paths: Any  # that share a camera ray
-    first_ray: Any
-    skipped: Any
-    stop: Any
-    sharing: Any  # lanes that share the samples of a seed
-    seed: Any
-
-
-class _Totals(NamedTuple):
-    """Sums of a lane, on the device."""
-
-    radiance: Array3f64
-    rays: UInt32
-    non_finite: UInt32
-
-    def plus(self, radiance: Array3f, rays: UInt32) -> _Totals:
-        """With one more sample."""
-        x, y, z = (dr.isfinite(channel) for channel in radiance)
-        return _Totals(
-            self.radiance + type(self.radiance)(radiance),
-            self.rays + rays,
-            self.non_finite + dr.select(x & y & z, 0, 1),
-        )
 
 
 @dataclass
@@ -124,7 +89,7 @@ class Launcher:
             return Sums(np.zeros((lanes, len(pixels), 3)), 0, 0)
         index = self.tracer.scene.types.UInt32
         start, paths = samples.start & 0xFFFFFFFF, self.paths_per_ray
-        work = _Work(
+        work = Work(
             first_pixel=pixels.start,
             pixels=len(pixels),
             paths=paths,
@@ -134,8 +99,16 @@ class Launcher:
             sharing=sharing,
             seed=seed_word & 0xFFFFFFFF,
         )
-        lane = dr.arange(index, len(pixels) * lanes)
-        totals = self._trace(lane, _Work(*(dr.opaque(index, n) for n in work)))
+        totals = self._trace(
+            Lanes(
+                self.tracer,
+                self.camera,
+                self.sampler,
+                jitter=self.jitter,
+                lane=dr.arange(index, len(pixels) * lanes),
+                work=Work(*(dr.opaque(index, n) for n in work)),
+            )
+        )
         with flush_denormals():
             dr.eval(*totals)
             dr.sync_thread()
@@ -143,45 +116,10 @@ class Launcher:
         by_pixel = by_lane.reshape(lanes, len(pixels), 3)
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 
-    def _trace(self, lane: UInt32, work: _Work) -> _Totals:
-        """Sum up the samples of each lane, camera ray by camera ray."""
-        types = self.tracer.scene.types
-        number = lane // work.pixels
-        pixel = work.first_pixel + lane - number * work.pixels
-        which = number // work.sharing
-        seed, start = work.seed + which, number - which * work.sharing
-
-        def sampler(index: UInt32) -> Sampler:
-            return self.sampler(pixel, index, seed)
-
-        def add_ray(ray: UInt32, *totals: Any) -> tuple[Any, ...]:
-            first = self._first_vertex(sampler(work.first_ray + ray))
-
-            def add_path(sample: UInt32, *totals: Any) -> tuple[Any, ...]:
-                index = work.first_ray * work.paths + sample
-                traced = self.tracer.follow(first, sampler(index))
-                return sample + 1, *_Totals(*totals).plus(*traced)
-
-            if self.paths_per_ray == 1:
-                return ray + work.sharing, *add_path(ray, *totals)[1:]
-            begin = dr.maximum(ray * work.paths, work.skipped)
-            end = dr.minimum((ray + 1) * work.paths, work.stop)
-            once = _Totals(*totals)
-            once = once._replace(rays=once.rays + first.path.rays)
-            first = first._replace(path=first.path._replace(rays=types.UInt32(0)))
-            state: tuple[Any, ...] = (begin, *once)
-            sums = dr.while_loop(state, lambda sample, *_: sample < end, add_path)[1:]
-            return ray + work.sharing, *sums
-
-        zeros = (dr.zeros(t, len(lane)) for t in (types.Array3f64, types.UInt32, types.UInt32))
-        state: tuple[Any, ...] = (start, *zeros)
-        is_left = lambda ray, *_: ray * work.paths < work.stop  # noqa: E731
-        return _Totals(*dr.while_loop(state, is_left, add_ray)[1:])
-
-    def _first_vertex(self, sampler: Sampler) -> Vertex:
-        middle = self.tracer.scene.types.Float32(0.5)
-        offset = sampler.next_2d(0) if self.jitter else vec2(middle, middle)
-        return self.tracer.first_vertex(self.camera.ray(sampler.pixel, offset), sampler)
+    def _trace(self, lanes: Lanes) -> Totals:
+        if self.paths_per_ray > 1:
+            return lanes.by_ray()
+        return lanes.by_vertex() if self.tracer.features.regeneration else lanes.by_path()
 
     def operations(self) -> int:
         """Dr.Jit's count of the operations in the kernel."""

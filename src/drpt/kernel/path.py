@@ -79,28 +79,31 @@ class Tracer:
 
     def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
         """What camera rays meet, and the light that it sends."""
+        return self._arrive(self.start(ray), sampler, 0)
+
+    def start(self, ray: Ray) -> Path:
+        """Paths along camera rays, which no light sample finds: their density is infinite."""
         types = self.scene.types
-        path = Path(
+        return Path(
             origin=ray.origin,
             direction=ray.direction,
             active=types.Bool(True),
             beta=types.Array3f(1),
             normal=types.Array3f(0),
-            pdf=types.Float32(0),
+            pdf=types.Float32(dr.inf),
             radiance=types.Array3f(0),
             rays=types.UInt32(0),
         )
-        return self._arrive(path, sampler, 0)
 
     def follow(self, first: Vertex, sampler: Sampler) -> tuple[Array3f, UInt32]:
         """Radiance (W/(m² sr), three channels) of whole paths on from a first vertex, and rays."""
-        if self._vertices <= 1:
+        if self.vertices <= 1:
             return first.path.radiance, first.path.rays
         path = self._leave(first, sampler, 0)
-        unrolled = min(self._vertices, UNROLLED_VERTICES)
+        unrolled = min(self.vertices, UNROLLED_VERTICES)
         for depth in range(1, unrolled):
-            path = self._step(path, sampler, depth)
-        if unrolled < self._vertices:
+            path = self.step(path, sampler, depth)
+        if unrolled < self.vertices:
             path = self._loop(path, sampler, unrolled)
         return path.radiance, path.rays
 
@@ -108,24 +111,25 @@ class Tracer:
         """Follow the paths that go on, from vertex number ``first``."""
 
         def goes_on(depth: UInt32, *path: Any) -> Bool:
-            return Path(*path).active & (depth < self._vertices)
+            return Path(*path).active
 
         def step(depth: UInt32, *path: Any) -> tuple[Any, ...]:
-            return depth + 1, *self._step(Path(*path), sampler, depth)
+            return depth + 1, *self.step(Path(*path), sampler, depth)
 
         state: tuple[Any, ...] = (self.scene.types.UInt32(first), *path)
         return Path(*dr.while_loop(state, goes_on, step)[1:])
 
     @property
-    def _vertices(self) -> int:
+    def vertices(self) -> int:
         """How many vertices a path has, beside the eye; the last one only emits."""
         if not self.features.emission:
             return 0
         return self.bounces + 1 if self.bounces == 0 or self.mode.counts_hits else self.bounces
 
-    def _step(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Path:
+    def step(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Path:
+        """Follow paths over their vertex number ``depth``; they are active if there is a next."""
         vertex = self._arrive(path, sampler, depth)
-        is_last = isinstance(depth, int) and depth == self._vertices - 1
+        is_last = isinstance(depth, int) and depth == self.vertices - 1
         return vertex.path if is_last else self._leave(vertex, sampler, depth)
 
     def _arrive(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Vertex:
@@ -133,11 +137,13 @@ class Tracer:
         scene, features = self.scene, self.features
         ray = Ray(path.origin, path.direction)
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
-        is_first = isinstance(depth, int) and depth == 0
-        hit = closest_hit(scene, features, ray, path.active, from_camera=is_first)
-        if is_first or self.mode.counts_hits:
-            weighted = features.mis and not is_first
-            radiance = radiance + path.beta * self._emission(path, hit, weighted=weighted)
+        is_first: Any = depth == 0
+        hit = closest_hit(scene, features, ray, path.active, from_camera=is_first is not False)
+        if self.mode.counts_hits or is_first is not False:
+            counts = True if self.mode.counts_hits else is_first
+            weighted = features.mis and is_first is not True
+            emitted = self._emission(path, hit, counts, weighted=weighted)
+            radiance = radiance + path.beta * emitted
         reflects = hit.primitive < scene.first_light
         hit = hit._replace(valid=hit.valid & reflects & (depth < self.bounces))
         brdf = make_brdf(scene, features, hit, -ray.direction)
@@ -152,16 +158,17 @@ class Tracer:
         path, hit, brdf = vertex
         direction, weight = self._next_direction(brdf, sampler, depth)
         beta = path.beta * weight
-        active = hit.valid & ~(dr.max(beta) <= 0)  # not a number goes on, to be counted
+        active = hit.valid & (depth < self.vertices - 1)
+        active &= ~(dr.max(beta) <= 0)  # not a number goes on, to be counted
         path = path._replace(origin=hit.point, direction=direction, active=active, beta=beta)
         if not self.features.mis:
             return path
         return path._replace(normal=hit.shading_normal, pdf=brdf.pdf(direction))
 
-    def _emission(self, path: Path, hit: Hit, *, weighted: bool) -> Array3f:
+    def _emission(self, path: Path, hit: Hit, counts: Bool | bool, *, weighted: bool) -> Array3f:
         """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
         scene = self.scene
-        lit = hit.valid & (hit.primitive >= scene.first_light) & hit.front
+        lit = hit.valid & (hit.primitive >= scene.first_light) & hit.front & counts
         light = scene.types.UInt32(0)
         if scene.light_count > 1:
             light = dr.select(lit, hit.primitive - scene.first_light, 0)

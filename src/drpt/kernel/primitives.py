@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.facets import bounds, has_area, make_facet, merge_coplanar
+from drpt.kernel.facets import COPLANAR, bounds, has_area, make_facet, merge_coplanar
 from drpt.kernel.solids import make_solids
 from drpt.scene import Diffuse, Mesh, Phong, Sphere
 
@@ -125,10 +125,22 @@ class Primitives:
         """The convex bodies among the facets."""
         return make_solids([facet.corners for facet in self.facets], *self._balls())
 
+    @property
+    def interior(self) -> bool:
+        """Whether a body or a sphere holds all of the scene."""
+        points, radii = self._balls()
+        return any(solid.encloses for solid in self.solids) or any(
+            bool(
+                (np.linalg.norm(points - row[:3], axis=1) + radii <= (1 + COPLANAR) * row[3]).all()
+            )
+            for row in self.spheres
+        )
+
     def _balls(self) -> tuple[Array, Array]:
         """Centres (n, 3) and radii (n,) of balls whose convex hull is that of the scene."""
         outlines = [facet.corners for facet in self.facets]
-        points = np.concatenate([*outlines, *self.light_corners, self.spheres[:, :3]])
+        triangles = self.triangles.reshape(-1, 3)
+        points = np.concatenate([*outlines, triangles, *self.light_corners, self.spheres[:, :3]])
         radii = np.zeros(len(points))
         radii[len(points) - len(self.spheres) :] = self.spheres[:, 3]
         return points, radii

@@ -1,0 +1,166 @@
+"""In which order a lane traces its samples; all orders give the same sums, up to rounding."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import drjit as dr
+
+from drpt.kernel.path import Path
+from drpt.kernel.vec import types_of, vec2
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from drjit.auto import Array3f, Array3f64, UInt32
+
+    from drpt.kernel.camera import DeviceCamera, Ray
+    from drpt.kernel.path import Tracer
+    from drpt.kernel.sampler import Sampler
+
+
+class Work(NamedTuple):
+    """What the lanes of a launch are to do: numbers, which are inputs of its kernel.
+
+    Samples count from the first path of the camera ray number ``first_ray``; so many as ``skipped``
+    are not asked for, and those from ``stop`` on.
+    """
+
+    first_pixel: Any
+    pixels: Any
+    paths: Any  # that share a camera ray
+    first_ray: Any
+    skipped: Any
+    stop: Any
+    sharing: Any  # lanes that share the samples of a seed
+    seed: Any
+
+
+class Totals(NamedTuple):
+    """Sums of each lane."""
+
+    radiance: Array3f64
+    rays: UInt32
+    non_finite: UInt32
+
+    def plus(self, radiance: Array3f, rays: UInt32, samples: Any = 1) -> Totals:
+        """With one more sample, or none."""
+        x, y, z = (dr.isfinite(channel) for channel in radiance)
+        return Totals(
+            self.radiance + type(self.radiance)(radiance),
+            self.rays + rays,
+            self.non_finite + dr.select(x & y & z, 0, samples),
+        )
+
+
+class Lanes:
+    """Lanes of a launch: a pixel each, and which of its samples.
+
+    Lane number k takes the pixel k mod ``pixels``; of those with the same pixel, so many as
+    ``sharing`` share the samples of one seed, each every so manyth, and the next ones take the
+    next seed.
+    """
+
+    def __init__(
+        self,
+        tracer: Tracer,
+        camera: DeviceCamera,
+        sampler: type[Sampler],
+        *,
+        jitter: bool,
+        lane: UInt32,
+        work: Work,
+    ) -> None:
+        number = lane // work.pixels
+        which = number // work.sharing
+        self.tracer, self.camera, self.sampler, self.jitter = tracer, camera, sampler, jitter
+        self.work, self.types = work, types_of(lane)
+        self.pixel = work.first_pixel + lane - number * work.pixels
+        self.seed = work.seed + which
+        self.start = number - which * work.sharing
+        self.count = len(lane)
+
+    def by_path(self) -> Totals:
+        """One path after the other, from camera to end."""
+        first_sample = self.work.first_ray
+
+        def add_path(sample: UInt32, *totals: Any) -> tuple[Any, ...]:
+            sampler = self._sampler(first_sample + sample)
+            first = self.tracer.first_vertex(self._camera_ray(sampler), sampler)
+            traced = self.tracer.follow(first, sampler)
+            return sample + self.work.sharing, *Totals(*totals).plus(*traced)
+
+        return Totals(*self._loop(add_path, lambda sample, *_: sample < self.work.stop))
+
+    def by_ray(self) -> Totals:
+        """One camera ray after the other, each with the paths that share it."""
+        work = self.work
+        first_sample = work.first_ray * work.paths
+
+        def add_ray(ray: UInt32, *totals: Any) -> tuple[Any, ...]:
+            sampler = self._sampler(work.first_ray + ray)
+            first = self.tracer.first_vertex(self._camera_ray(sampler), sampler)
+            once = Totals(*totals)
+            once = once._replace(rays=once.rays + first.path.rays)
+            first = first._replace(path=first.path._replace(rays=self.types.UInt32(0)))
+
+            def add_path(sample: UInt32, *totals: Any) -> tuple[Any, ...]:
+                traced = self.tracer.follow(first, self._sampler(first_sample + sample))
+                return sample + 1, *Totals(*totals).plus(*traced)
+
+            begin = dr.maximum(ray * work.paths, work.skipped)
+            end = dr.minimum((ray + 1) * work.paths, work.stop)
+            state: tuple[Any, ...] = (begin, *once)
+            sums = dr.while_loop(state, lambda sample, *_: sample < end, add_path)[1:]
+            return ray + work.sharing, *sums
+
+        return Totals(*self._loop(add_ray, lambda ray, *_: ray * work.paths < work.stop))
+
+    def by_vertex(self) -> Totals:
+        """One vertex after the other: where a path has ended, the next one starts at once.
+
+        So no lane waits for the longest path among its neighbours (Novák et al. 2010, "Path
+        Regeneration for Interactive Path Tracing"); in turn all vertices share one piece of code.
+        """
+        work, tracer, fields = self.work, self.tracer, len(Path._fields)
+        first_sample = work.first_ray
+
+        def add_vertex(sample: UInt32, depth: UInt32, *state: Any) -> tuple[Any, ...]:
+            sampler = self._sampler(first_sample + sample)
+            path, totals = Path(*state[:fields]), Totals(*state[fields:])
+            fresh = tracer.start(self._camera_ray(sampler))
+            now: list[Any] = [
+                dr.select(depth == 0, *pair) for pair in zip(fresh, path, strict=True)
+            ]
+            path = tracer.step(Path(*now), sampler, depth)
+            ends = ~path.active
+            totals = totals.plus(
+                dr.select(ends, path.radiance, 0),
+                dr.select(ends, path.rays, 0),
+                dr.select(ends, self.types.UInt32(1), 0),
+            )
+            sample = sample + dr.select(ends, work.sharing, 0)
+            return sample, dr.select(ends, 0, depth + 1), *path, *totals
+
+        any_path = tracer.start(self._camera_ray(self._sampler(self.start)))
+        zero = dr.zeros(self.types.UInt32, self.count)
+        sums = self._loop(add_vertex, lambda sample, *_: sample < work.stop, zero, *any_path)
+        return Totals(*sums[-3:])
+
+    def _loop(
+        self, body: Callable[..., tuple[Any, ...]], goes_on: Callable[..., Any], *state: Any
+    ) -> Any:
+        zeros = (
+            dr.zeros(t, self.count)
+            for t in (self.types.Array3f64, self.types.UInt32, self.types.UInt32)
+        )
+        start: tuple[Any, ...] = (self.start, *state, *zeros)
+        return dr.while_loop(start, goes_on, body)[1:]
+
+    def _sampler(self, index: UInt32) -> Sampler:
+        return self.sampler(self.pixel, index, self.seed)
+
+    def _camera_ray(self, sampler: Sampler) -> Ray:
+        middle = self.types.Float32(0.5)
+        offset = sampler.next_2d(0) if self.jitter else vec2(middle, middle)
+        return self.camera.ray(self.pixel, offset)
