@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 SIGNIFICANCE = 1e-4
 """Probability that a gate fails by chance: about a hundred of them are passed."""
 
+ROUNDING = 4e-6
+"""Error of a mean, relative, that is left where samples have no noise: of float32."""
+
 PILOT_PATHS = 2**18
 PILOT_MARGIN = 1.5
 """Of variance: what a pilot may underestimate."""
@@ -65,8 +68,9 @@ def measure(
 
     seeds = (2 * seed, 2 * seed + 1)
     a, b = (image(bounces, s) - (image(0, s) if reflected else 0) for s in seeds)
-    error = np.sqrt((((a - b) / 2) ** 2).sum(axis=0)) / len(a)
-    return Measured(((a + b) / 2).mean(axis=0), error)
+    mean = ((a + b) / 2).mean(axis=0)
+    noise = np.sqrt((((a - b) / 2) ** 2).sum(axis=0)) / len(a)
+    return Measured(mean, np.hypot(noise, ROUNDING * np.abs(mean)))
 
 
 def measure_to(
@@ -78,9 +82,9 @@ def measure_to(
     seed: int = 1,
     **options: Any,
 ) -> Measured:
-    """Measure with as many paths as it takes to detect such a bias, by a smaller pilot."""
+    """Measure with as many paths as it takes to detect such a bias, by a pilot's error."""
     pilot = measure(scene, PILOT_PATHS, bounces, mode, seed=0, **options)
-    factor = (pilot.detects() / detectable) ** 2 * PILOT_MARGIN
+    factor = max(1, (pilot.detects() / detectable) ** 2 * PILOT_MARGIN)
     return measure(scene, int(factor * PILOT_PATHS), bounces, mode, seed=seed, **options)
 
 

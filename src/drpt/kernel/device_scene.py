@@ -11,6 +11,7 @@ import numpy as np
 from drpt.kernel.mesh import TriangleMesh
 from drpt.kernel.primitives import UNROLL_LIMIT
 from drpt.kernel.solids import edge_owners
+from drpt.kernel.sphere_tree import SphereTree
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -57,8 +58,8 @@ class DeviceScene:
         0 for other facets, None without such.
     light_facets, light_mesh
         The same for those that emit.
-    balls
-        Each sphere, where they are few.
+    balls, sphere_tree
+        Each sphere, where they are few; else all of them.
     geometry
         Rows of 4 by primitive: (normal, offset) or (centre, radius).
     reflectance
@@ -85,6 +86,7 @@ class DeviceScene:
     light_facets: tuple[Facet, ...]
     light_mesh: TriangleMesh | None
     balls: tuple[Ball, ...]
+    sphere_tree: SphereTree | None
     geometry: Float
     reflectance: Float
     smooth: Float
@@ -134,6 +136,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         light_facets=primitives.light_facets,
         light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
+        sphere_tree=None if few_spheres else SphereTree(primitives.spheres, first, types),
         geometry=array(np.concatenate([planes, primitives.spheres, lit_planes])),
         reflectance=array(primitives.reflectance),
         smooth=array(

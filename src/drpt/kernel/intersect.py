@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from drpt.kernel.estimator import Features
     from drpt.kernel.facets import Facet
     from drpt.kernel.solids import Face, Solid, Span
+    from drpt.kernel.sphere_tree import SphereTree
 
 SPAWN_OFFSET = 2.0**-20
 """How far off its surface a ray starts, relative to the coordinates there: 16 half ulps.
@@ -84,6 +85,8 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
     blocked = scene.types.Bool(False)
     if scene.mesh is not None:
         blocked = scene.mesh.blocks(ray, before, active)
+    if scene.sphere_tree is not None:
+        blocked |= _many_block(scene.sphere_tree, ray, active, target, before, beyond)
     for solid in scene.solids:
         if solid.shading:
             blocked |= _blocks(ray, solid, before)
@@ -106,7 +109,7 @@ def _surfaces_and_spheres(
     """What a ray may meet first: a primitive's number, whether it is met beyond 0, and where.
 
     For shadow rays, ``target`` is the number of the light that they lead to, which casts none; a
-    mesh is asked about those as a whole.
+    mesh and many spheres are asked about those as a whole.
     """
     if scene.mesh is not None and target is None:
         yield scene.mesh.closest(ray, active)
@@ -117,26 +120,42 @@ def _surfaces_and_spheres(
         met, t = _meet_sphere(ray, ball)
         is_light = number >= scene.first_light
         yield number, met & (target != number) if is_light and target is not None else met, t
-    if scene.sphere_count > len(scene.balls):
-        yield _closest_of_spheres(scene, ray, active, target)
+    if scene.sphere_tree is not None and target is None:
+        yield _closest_of_many(scene.sphere_tree, ray, active)
 
 
-def _closest_of_spheres(
-    scene: DeviceScene, ray: Ray, active: Bool, target: UInt32 | None
-) -> tuple[UInt32, Bool, Float]:
-    """The first of many spheres, by a loop over them."""
-    types = scene.types
+def _closest_of_many(tree: SphereTree, ray: Ray, active: Bool) -> tuple[UInt32, Bool, Float]:
+    """The first of many spheres; of coincident ones, the last."""
 
-    def step(number: UInt32, nearest: Float, found: UInt32) -> tuple[UInt32, Float, UInt32]:
-        row = scene.geometry_row(number)
-        met, t = _meet_sphere(ray, Ball(vec3(row[0], row[1], row[2]), row[3]))
-        closer = met & (t <= nearest) & (True if target is None else number != target)
-        return number + 1, dr.select(closer, t, nearest), dr.select(closer, number, found)
+    def visit(
+        row: Array4f, number: UInt32, is_leaf: Bool, end: Float, found: UInt32
+    ) -> tuple[Float, UInt32]:
+        met, t = _meet_sphere(ray, _ball_of(row))
+        closer = is_leaf & met & ((t < end) | ((t == end) & (number > found)))
+        return dr.select(closer, t, end), dr.select(closer, number, found)
 
-    end = scene.first_sphere + scene.sphere_count
-    state = (types.UInt32(scene.first_sphere), types.Float32(dr.inf), types.UInt32(0))
-    _, t, number = dr.while_loop(state, lambda i, *_: active & (i < end), step)
+    t, number = tree.walk(ray, active, types_of(ray.origin.x).Float32(dr.inf), visit)
     return number, t < dr.inf, t
+
+
+def _many_block(
+    tree: SphereTree, ray: Ray, active: Bool, target: UInt32, before: Float, beyond: Float
+) -> Bool:
+    """Whether any of many spheres does; the walk ends at the first one."""
+
+    def visit(
+        row: Array4f, number: UInt32, is_leaf: Bool, end: Float, found: UInt32
+    ) -> tuple[Float, UInt32]:
+        met, t = _meet_sphere(ray, _ball_of(row))
+        reach = dr.select(number > target, beyond, before)
+        blocks = is_leaf & met & (number != target) & (t < reach)
+        return dr.select(blocks, -1, end), found
+
+    return tree.walk(ray, active, beyond, visit)[0] < 0
+
+
+def _ball_of(row: Array4f) -> Ball:
+    return Ball(vec3(row[0], row[1], row[2]), row[3])
 
 
 def _light_triangles(

@@ -1,0 +1,122 @@
+"""Many spheres: a complete binary tree of boxes, walked without a stack."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import numpy as np
+
+from drpt.kernel.vec import greater, lesser, types_of, vec3
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+    from drjit.auto import Array3f, Bool, Float, UInt32
+    from numpy.typing import NDArray
+
+    from drpt.kernel.camera import Ray
+
+    Array = NDArray[np.float64]
+
+ROOM = 2.0**-20
+"""By which boxes are larger than what is in them, relative to the largest coordinate: 8 ulps."""
+
+
+def arrange(centers: Array) -> NDArray[np.intp]:
+    """Order of points (n, 3), n a power of two, in which each aligned run of 2ᵏ stands together.
+
+    Every group is split at its median, along its longest side, until there is one point in each;
+    points that are not a number stand last.
+    """
+    order = np.arange(len(centers))[None]
+    while order.shape[1] > 1:
+        points = centers[order]
+        side = np.fmax.reduce(points, axis=1) - np.fmin.reduce(points, axis=1)
+        axis = np.nan_to_num(side, nan=-1).argmax(axis=1)
+        keys = np.take_along_axis(points, axis[:, None, None], axis=2)[..., 0]
+        within = np.argsort(keys, axis=1, kind="stable")
+        order = np.take_along_axis(order, within, axis=1).reshape(-1, order.shape[1] // 2)
+    return order[:, 0]
+
+
+def boxes_around(spheres: Array) -> Array:
+    """Lowest and highest corners (2n, 6) of the boxes around spheres (n, 4), n a power of two.
+
+    The nodes of a complete binary tree: number 1 is the root, the children of i are 2i and 2i + 1,
+    and the spheres are the last n. Number 0 is none, and the box of no sphere is inside out.
+    """
+    centers, radii = spheres[:, :3], spheres[:, 3:]
+    room = radii + ROOM * np.nanmax(np.abs(centers) + radii)
+    levels = [np.concatenate([centers - room, centers + room], axis=1)]
+    levels[0][np.isnan(radii[:, 0])] = 3 * [np.inf] + 3 * [-np.inf]
+    while len(levels[-1]) > 1:
+        low, high = np.split(levels[-1].reshape(-1, 2, 6), 2, axis=2)
+        levels.append(np.concatenate([low.min(axis=1), high.max(axis=1)], axis=1))
+    return np.concatenate([np.zeros((1, 6)), *reversed(levels)])
+
+
+class SphereTree:
+    """Spheres (n, 4) as centres and radii, numbered from ``first`` on."""
+
+    def __init__(self, spheres: Array, first: int, types: ModuleType) -> None:
+        self._leaves = 2 ** (len(spheres) - 1).bit_length()
+        padded = np.full((self._leaves, 4), np.nan)
+        padded[: len(spheres)] = spheres
+        order = arrange(padded[:, :3])
+        boxes = boxes_around(padded[order])
+        rows = np.concatenate([boxes[:, :3], boxes[:, 3:], np.zeros((len(boxes), 2))], axis=1)
+        self._boxes = types.Float32(rows.astype(np.float32).ravel())
+        self._spheres = types.Float32(padded[order].astype(np.float32).ravel())
+        self._numbers = types.UInt32((first + order).astype(np.uint32))
+
+    def walk(
+        self, ray: Ray, active: Bool, end: Float, visit: Callable[..., tuple[Float, UInt32]]
+    ) -> tuple[Float, UInt32]:
+        """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
+
+        ``visit(row, number, is_leaf, end, found)`` gets a sphere, and what an earlier visit has
+        returned; the walk is over where the end is before the origin.
+        """
+        types = types_of(end)
+        inverse = dr.rcp(ray.direction)
+
+        def step(node: UInt32, end: Float, found: UInt32) -> tuple[UInt32, Float, UInt32]:
+            is_leaf = node >= self._leaves
+            slot = node - self._leaves
+            row = dr.gather(types.Array4f, self._spheres, slot, is_leaf)
+            number = dr.gather(types.UInt32, self._numbers, slot, is_leaf)
+            end, found = visit(row, number, is_leaf, end, found)
+            enters = self._meets_box(ray.origin, inverse, node, end, ~is_leaf)
+            return dr.select(enters, 2 * node, _next_after(node)), end, found
+
+        state = (types.UInt32(1), end, types.UInt32(0))
+        goes_on = lambda node, end, _: active & (node > 0) & (end > 0)  # noqa: E731
+        _, end, found = dr.while_loop(state, goes_on, step)
+        return end, found
+
+    def _meets_box(
+        self, origin: Array3f, inverse: Array3f, node: UInt32, end: Float, inner: Bool
+    ) -> Bool:
+        types = types_of(end)
+        a, b = (dr.gather(types.Array4f, self._boxes, 2 * node + k, inner) for k in range(2))
+        low, high = vec3(a[0], a[1], a[2]) - origin, vec3(a[3], b[0], b[1]) - origin
+        near: Any = types.Float32(0)
+        far: Any = end
+        for axis in range(3):
+            upward = inverse[axis] > 0
+            first, last = low[axis] * inverse[axis], high[axis] * inverse[axis]
+            near = greater(dr.select(upward, first, last), near)
+            far = lesser(dr.select(upward, last, first), far)
+        return inner & (near <= far * (1 + ROOM))
+
+
+def _next_after(node: UInt32) -> UInt32:
+    """The node to visit once all below a node are done: a sibling of it or of one above; 0 at last.
+
+    Ends of the nodes above that are right children all are, as node + 1 has trailing zeros.
+    """
+    following = node + 1
+    following = following >> dr.tzcnt(following)
+    return dr.select(following == 1, 0, following)
