@@ -53,7 +53,7 @@ class Drpt:
         """Closest hits of rays (n, 3), rounded to float32."""
         types = self.scene.types
         ray = Ray(self._vectors(origins), self._vectors(directions))
-        hit = closest_hit(self.scene, self.features, ray, types.Bool(True), from_camera=True)
+        hit = closest_hit(self.scene, self.features, ray, types.Bool(True))
         dr.eval(hit)
         n = len(origins)
         valid, primitive = (np.broadcast_to(np.array(x), n) for x in (hit.valid, hit.primitive))

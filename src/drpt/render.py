@@ -44,7 +44,7 @@ LAUNCH_PATHS = 2**24
 """Paths of a launch: long enough to be worth it, short enough to be interrupted."""
 LAUNCH_PIXELS = 2**20
 """Pixels of a launch at the most, which bounds its memory to some 100 MB."""
-SHARING_SPP = 16
+SHARING_SPP = 64
 """With so many samples per pixel, edges are smooth even if a few share a camera ray."""
 LAUNCH_LANES = 2**18
 """Lanes of a launch at the least: small pictures use several for each pixel."""
@@ -81,6 +81,8 @@ class Result:
     first_non_finite
         Column, row and number of one of them, if there are any; :meth:`Rendering.sample` traces
         it again.
+    warning
+        What is wrong with the picture, and how to see it again; None if nothing is.
     """
 
     image: NDArray[np.float32]
@@ -95,19 +97,7 @@ class Result:
     rays: int
     non_finite: int
     first_non_finite: tuple[int, int, int] | None = None
-
-    @property
-    def warning(self) -> str | None:
-        """What is wrong with the picture, and how to see it again; None if nothing is."""
-        if self.first_non_finite is None:
-            return None
-        column, row, sample = self.first_non_finite
-        return (
-            f"{self.non_finite} of {self.paths} samples were not finite, one of them in pixel "
-            f"({column}, {row}): Rendering(scene, {self.spp}, {self.bounces}, {str(self.mode)!r}, "
-            f"sampler={self.sampler!r}, seed={self.seed}, jitter={self.jitter})"
-            f".sample({column}, {row}, {sample}) traces it again"
-        )
+    warning: str | None = None
 
     @property
     def paths(self) -> int:
@@ -120,7 +110,7 @@ class Result:
         settings = {
             field.name: getattr(self, field.name)
             for field in fields(self)
-            if field.name not in ("image", "scene", "first_non_finite")
+            if field.name not in ("image", "scene", "first_non_finite", "warning")
         }
         if self.first_non_finite is not None:
             settings["first_non_finite"] = "{} {} {}".format(*self.first_non_finite)
@@ -266,6 +256,18 @@ class Rendering:
             rays=self._rays,
             non_finite=self._non_finite,
             first_non_finite=self._first_non_finite,
+            warning=self._warning(),
+        )
+
+    def _warning(self) -> str | None:
+        if self._first_non_finite is None:
+            return None
+        column, row, sample = self._first_non_finite
+        return (
+            f"{self._non_finite} samples were not finite, one of them in pixel ({column}, {row}): "
+            f"Rendering(scene, {self.spp}, {self.bounces}, {str(self.mode)!r}, "
+            f"sampler={self.sampler!r}, seed={self.seed}, jitter={self.jitter})"
+            f".sample({column}, {row}, {sample}) traces it again"
         )
 
 
@@ -286,7 +288,7 @@ def render(
     scene
         What to render.
     spp
-        Samples per pixel, from 1 to 2⁴⁸; each is a path of its own. From 16 on, with Sobol' points,
+        Samples per pixel, from 1 to 2⁴⁸; each is a path of its own. From 64 on, with Sobol' points,
         in rooms that a single sphere lights, four of them share their camera ray and its first
         vertex: :func:`explain` says whether.
     bounces

@@ -72,9 +72,7 @@ class World:
 
     def closest(self, origins: Floats, directions: Floats) -> Found:
         ray = self._ray(origins, directions)
-        hit = closest_hit(
-            self.scene, self.features, ray, self.scene.types.Bool(True), from_camera=True
-        )
+        hit = closest_hit(self.scene, self.features, ray, self.scene.types.Bool(True))
         dr.eval(hit)
         albedos = [shape.material.albedo[0] if shape.material else -1 for shape in self.shapes]
         reflectance = self.primitives.reflectance[:, 0]

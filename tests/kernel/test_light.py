@@ -85,7 +85,7 @@ class Lights:
         """Return 1 / density of rays from a surface at the origin, and where they hit a light."""
         at = Receiver(to_device([ORIGIN]), to_device([normal]))
         ray = Ray(at.point, direction)
-        hit = closest_hit(self.scene, self.features, ray, TYPES.Bool([True]), from_camera=True)
+        hit = closest_hit(self.scene, self.features, ray, TYPES.Bool([True]))
         number = TYPES.UInt32([light])
         found = np.array(hit.valid & (hit.primitive == self.scene.first_light + number))
         return to_host(inverse_pdf(self.scene, self.features, at, number, ray, hit)), found

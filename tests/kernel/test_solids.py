@@ -13,7 +13,7 @@ import pytest
 import drpt
 from drpt.kernel.camera import Ray
 from drpt.kernel.estimator import Mode
-from drpt.kernel.intersect import closest_hit, occluded
+from drpt.kernel.intersect import SPAWN_OFFSET, closest_hit, occluded
 from drpt.kernel.launch import make_launcher, prepare
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.solids import FOLD, THINNEST, find_bodies, make_solids
@@ -159,13 +159,12 @@ class World:
         launcher = make_launcher(TYPES, scene, 1, Mode.MIS, "independent", jitter=False)
         self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
 
-    def closest(self, origins: Floats, directions: Floats, **options: Any) -> dict[str, Floats]:
+    def closest(self, origins: Floats, directions: Floats) -> dict[str, Floats]:
         hit = closest_hit(
             self.scene,
             self.features,
             Ray(vectors(origins), vectors(directions)),
             TYPES.Bool(True),
-            **{"from_camera": True, **options},
         )
         dr.eval(hit)
         n = len(origins)
@@ -173,6 +172,7 @@ class World:
         return {
             "primitive": np.where(valid, np.broadcast_to(np.array(hit.primitive), n), MISS),
             "distance": np.where(valid, np.broadcast_to(to_host(hit.distance), n), np.inf),
+            "point": to_host(hit.point),
             "normal": np.where(valid[:, None], to_host(hit.normal), 0),
         }
 
@@ -250,17 +250,45 @@ def outline(shape: Shape) -> Floats:
     return np.array([shape.center]) if isinstance(shape, drpt.Sphere) else shape.vertices
 
 
-def test_a_ray_stays_in_the_room_even_if_it_starts_outside() -> None:
-    shapes = SCENES["a room with a box and a light"]
-    world = World(shapes)
-    points = np.array([(2 + 1e-6, 0.3, 0.1), (0.1, -2 - 1e-6, 0.2)])
+def test_a_ray_stays_in_the_room_if_rounding_has_put_its_origin_outside() -> None:
+    world = World(SCENES["a room with a box and a light"])
+    points = np.array([(2 + 2e-7, 0.3, 0.1), (0.1, -2 - 2e-7, 0.2)])
     outward = normalize(points * (1, 1, 0))
-    hit = world.closest(points, outward, from_camera=False)
+    hit = world.closest(points, outward)
     assert (hit["primitive"] != MISS).all()
-    assert np.abs(hit["distance"]).max() < 1e-5
-    assert (world.closest(points, outward)["primitive"] == MISS).all()
-    front = world.closest(np.array([(0.0, 0, 1.9)]), np.array([(0.0, 0, 1)]), from_camera=False)
+    assert np.abs(hit["distance"]).max() < 2 * SPAWN_OFFSET
+    beyond = world.closest(points + 2 * SPAWN_OFFSET * outward, outward)
+    assert (beyond["primitive"] == MISS).all()
+    front = world.closest(np.array([(0.0, 0, 1.9)]), np.array([(0.0, 0, 1)]))
     assert (front["primitive"] == MISS).all()
+
+
+@pytest.mark.parametrize("mode", ["implicit", "explicit", "mis"])
+@pytest.mark.parametrize("leave_out", [[], [5]])
+def test_a_room_is_dark_outside(leave_out: list[int], mode: str) -> None:
+    """A lamp inside, and a camera behind the wall."""
+    camera = drpt.Camera((0.5, 0.5, -4), (0.5, 0.5, 0), (0, 1, 0), 20, 16, 16)
+    lamp = drpt.Sphere((0.5, 0.5, 0.5), 0.1, radiance=10)
+    scene = drpt.Scene(camera, [mesh(box(leave_out=leave_out)), lamp])
+    assert not drpt.render(scene, 64, 4, mode).image.any()
+
+
+@pytest.mark.parametrize("size", [10.0, 1e3, 1e5])
+def test_a_large_body_is_as_exact_as_the_places_on_it(size: float) -> None:
+    """Rays that leave a tilted block, whose face passes the origin, do not meet it again."""
+    corners = size * (CORNERS - (0.5, 0.5, 1.0))
+    outlines = [corners[list(quad)] @ TILT for quad in QUADS]
+    far = drpt.Sphere((0, 0, 0), 4 * size, material=DULL)  # the origin of the kernel stays there
+    world = World([mesh(outlines), far])
+    up = np.array([0.0, 0, 1]) @ TILT
+    rng = np.random.default_rng(9)
+    origins = up + 0.5 * sample_uniform_sphere(rng, 2**14)
+    first = world.closest(origins, normalize(-up + 0.4 * sample_uniform_sphere(rng, 2**14)))
+    assert (first["primitive"] < 6).all()
+    away = sample_uniform_sphere(rng, 2**14)
+    away *= np.sign(away @ up)[:, None]
+    again = world.closest(first["point"], away)
+    assert (again["primitive"] >= 6).all()
 
 
 @pytest.mark.parametrize("mode", ["implicit", "explicit", "mis"])

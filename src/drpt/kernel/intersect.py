@@ -30,6 +30,12 @@ For a triangle of a mesh, whose test starts from its corners, those are coordina
 polygon it starts as far again back along the ray that has come: in a corner, a point that was
 rounded to behind the other wall returns to where that ray was.
 """
+SKIN = SPAWN_OFFSET / 2
+"""How far outside a convex body an origin counts as inside, relative to its coordinates.
+
+Rounding may put a point in a corner of a room beyond the other wall; what has been stepped off the
+outside of a face is farther away.
+"""
 COINCIDENT = 2.0**-20
 """Up to which difference surfaces are one, relative to the coordinates and the distance to them.
 
@@ -55,13 +61,11 @@ class Hit(NamedTuple):
     front: Bool
 
 
-def closest_hit(
-    scene: DeviceScene, features: Features, ray: Ray, active: Bool, *, from_camera: bool
-) -> Hit:
-    """The first surface that a ray meets, which comes from the camera or from a surface."""
+def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
+    """The first surface that a ray meets."""
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
     for solid in scene.solids:
-        number, met, t = _meet_solid(ray, solid, inside=solid.encloses and not from_camera)
+        number, met, t = _meet_solid(ray, solid)
         closer = met & (t < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
@@ -175,31 +179,32 @@ def _light_triangles(
         yield found, met if target is None else met & (target != found), t, front
 
 
-def _meet_solid(ray: Ray, solid: Solid, *, inside: bool) -> tuple[UInt32, Bool, Float]:
-    """Number of the facet by which a ray enters a convex body, or else leaves it, and where.
-
-    A ray that is known to start ``inside`` leaves even where rounding has put its origin outside.
-    """
+def _meet_solid(ray: Ray, solid: Solid) -> tuple[UInt32, Bool, Float]:
+    """Number of the facet by which a ray enters a convex body, or else leaves it, and where."""
     passage = _pass(ray, solid.spans)
-    met, t = _surface_of(passage, inside=inside)
+    met, t = _surface_of(passage)
     number = types_of(t).UInt32(0)
     for face, at in passage.faces:
         if face.facet is not None:
             number = dr.select(at == t, face.facet, number)
-    return number, met, t
+    return number, met, greater(t, 0)
 
 
 def _blocks(ray: Ray, solid: Solid, distance: Float) -> Bool:
     """Whether a convex body stands on the first ``distance`` of a ray between two surfaces."""
-    met, t = _surface_of(_pass(ray, solid.shading), inside=False)
+    met, t = _surface_of(_pass(ray, solid.shading))
     return met & (t < distance)
 
 
 class _Passage(NamedTuple):
-    """Where a ray enters and leaves a convex body, and where it meets the plane of each face."""
+    """Where a ray enters and leaves a convex body, and where it meets the plane of each face.
+
+    ``inside`` tells whether its origin is within, or no more than `SKIN` outside.
+    """
 
     enters: Any
     leaves: Any
+    inside: Any
     faces: list[tuple[Face, Float]]
 
 
@@ -210,7 +215,9 @@ def _pass(ray: Ray, spans: tuple[Span, ...]) -> _Passage:
     """
     enters: Any = -dr.inf
     leaves: Any = dr.inf
+    inside: Any = True
     faces: list[tuple[Face, Float]] = []
+    skin = SKIN * _largest(ray.origin)
     for span in spans:
         rate = dr.rcp(_dot(span.direction, ray.direction))
         position = _dot(span.direction, ray.origin)
@@ -218,22 +225,25 @@ def _pass(ray: Ray, spans: tuple[Span, ...]) -> _Passage:
         for face, enters_here in ((span.low, upward), (span.high, ~upward)):
             if face is None:
                 continue
-            at = (face.offset - position) * rate
+            height = face.offset - position
+            at = height * rate
             enters = dr.select(enters_here, greater(at, enters), enters)
             leaves = dr.select(enters_here, leaves, lesser(at, leaves))
+            inside = inside & (height <= skin if face is span.low else height >= -skin)
             faces.append((face, at))
-    return _Passage(enters, leaves, faces)
+    return _Passage(enters, leaves, inside, faces)
 
 
-def _surface_of(passage: _Passage, *, inside: bool) -> tuple[Bool, Float]:
-    """Whether and where a ray enters a convex body by its surface, or else leaves it by that."""
-    enters, leaves, faces = passage
+def _surface_of(passage: _Passage) -> tuple[Bool, Float]:
+    """Whether and where a ray enters a convex body by its surface, or else leaves it by that.
+
+    From the skin of a face to its outside a ray leaves at once, at a distance not above 0.
+    """
+    enters, leaves, inside, faces = passage
     openings = [at for face, at in faces if face.facet is None]
-    met, t = types_of(leaves).Bool(True), leaves
-    if not inside:
-        by_surface = _all(enters > 0, [at != enters for at in openings])
-        met = (enters <= leaves) & (leaves > 0)
-        t = dr.select(by_surface, enters, leaves)
+    by_surface = _all((enters > 0) & ~inside, [at != enters for at in openings])
+    t = dr.select(by_surface, enters, leaves)
+    met = inside | (enters <= leaves) & (leaves > 0)
     return _all(met, [at != t for at in openings]), t
 
 

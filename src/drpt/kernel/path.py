@@ -138,7 +138,7 @@ class Tracer:
         ray = Ray(path.origin, path.direction)
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
         is_first: Any = depth == 0
-        hit = closest_hit(scene, features, ray, path.active, from_camera=is_first is not False)
+        hit = closest_hit(scene, features, ray, path.active)
         if self.mode.counts_hits or is_first is not False:
             counts = True if self.mode.counts_hits else is_first
             weighted = features.mis and is_first is not True

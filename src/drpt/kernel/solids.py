@@ -34,13 +34,13 @@ THINNEST = 2.0**-14
 
 
 class Side(NamedTuple):
-    """A plane by its unit normal, which points outward, and a point of it.
+    """A plane normal·p = offset, its unit normal outward.
 
     ``facet`` is the number of the polygon there; None where the body is open.
     """
 
     normal: Array
-    point: Array
+    offset: float
     facet: int | None
 
 
@@ -62,8 +62,8 @@ class Span(NamedTuple):
 class Solid(NamedTuple):
     """A convex body: what all of its spans have in common.
 
-    ``shading`` are the spans that matter between two points of the scene. What ``encloses`` all
-    of the scene is left only through its faces.
+    ``shading`` are the spans that matter between two points of the scene; ``encloses`` tells
+    whether all of the scene is inside.
     """
 
     spans: tuple[Span, ...]
@@ -82,7 +82,7 @@ def make_solids(outlines: Sequence[Array], points: Array, radii: Array) -> tuple
     slack = COPLANAR * np.abs(points).max(initial=0)
 
     def holds(side: Side) -> bool:
-        return bool(((points - side.point) @ side.normal + radii <= slack).all())
+        return bool((points @ side.normal + radii <= side.offset + slack).all())
 
     return tuple(
         Solid(
@@ -165,7 +165,7 @@ def _sides(polygons: list[tuple[Array, int | None]]) -> list[Side] | None:
         is_convex = heights.max() <= COPLANAR * extent
         if not is_flat or not is_convex or -heights.min() < THINNEST * reach:
             return None
-        sides.append(Side(normal, point, facet))
+        sides.append(Side(normal, float(normal @ point), facet))
     return sides if all(_differ(a, b) for a, b in combinations(sides, 2)) else None
 
 
@@ -183,11 +183,15 @@ def _direction(side: Side) -> Array:
 
 
 def _spans(sides: list[Side]) -> tuple[Span, ...]:
-    """Spans of half-spaces; those of opposite normals are one."""
+    """Spans of half-spaces; those of opposite normals are one.
+
+    Of a plane, the point next to the origin keeps its place as the direction is rounded, so that
+    the error of any other point is relative to its distance from the origin.
+    """
     limits: dict[tuple[float, ...], list[Face | None]] = {}
     for side in sides:
         direction = _direction(side)
-        face = Face(float(direction @ side.point), side.facet)
+        face = Face(float(direction @ side.normal) * side.offset, side.facet)
         is_high = bool(direction @ side.normal > 0)
         limits.setdefault(tuple(direction.tolist()), [None, None])[is_high] = face
     return tuple(Span(direction, *ends) for direction, ends in limits.items())
