@@ -169,8 +169,8 @@ def _aim_at_cap(cap: _Cap, normal: Array3f, u: Array2f) -> Aim:
     local_normal = basis.to_local(normal)
     lifted, cosine = square_to_projected_cap(u, cap.sine, cap.height, local_normal)
     local = dr.select(cap.above, lifted, square_to_cone(u, cap.height))
-    side = cap.distance * dr.sqrt(dr.square(local.x) + dr.square(local.y))
-    depth = dr.sqrt(greater((cap.radius - side) * (cap.radius + side), 0))
+    side = dr.square(cap.distance) * (dr.square(local.x) + dr.square(local.y))
+    depth = dr.sqrt(greater(dr.square(cap.radius) - side, 0))
     distance = cap.distance * local.z - depth
     return Aim(basis.to_world(local), distance, cap.inverse_pdf(cosine))
 
