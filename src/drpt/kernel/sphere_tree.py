@@ -1,4 +1,8 @@
-"""Many spheres: a complete binary tree of boxes, walked without a stack."""
+"""Many spheres: a complete binary tree of boxes, walked from near to far without a stack.
+
+Source: Laine 2010, "Restart Trail for Stackless BVH Traversal"; here the nodes' numbers tell their
+parents, so that a walk goes on at the sibling that it has passed over instead of at the root.
+"""
 
 from __future__ import annotations
 
@@ -66,8 +70,7 @@ class SphereTree:
         padded[: len(spheres)] = spheres
         order = arrange(padded[:, :3])
         boxes = boxes_around(padded[order])
-        rows = np.concatenate([boxes[:, :3], boxes[:, 3:], np.zeros((len(boxes), 2))], axis=1)
-        self._boxes = types.Float32(rows.astype(np.float32).ravel())
+        self._children = types.Float32(boxes.reshape(-1, 12).astype(np.float32).ravel())
         self._spheres = types.Float32(padded[order].astype(np.float32).ravel())
         self._numbers = types.UInt32((first + order).astype(np.uint32))
 
@@ -82,41 +85,47 @@ class SphereTree:
         types = types_of(end)
         inverse = dr.rcp(ray.direction)
 
-        def step(node: UInt32, end: Float, found: UInt32) -> tuple[UInt32, Float, UInt32]:
+        def step(
+            node: UInt32, trail: UInt32, end: Float, found: UInt32
+        ) -> tuple[UInt32, UInt32, Float, UInt32]:
             is_leaf = node >= self._leaves
             slot = node - self._leaves
             row = dr.gather(types.Array4f, self._spheres, slot, is_leaf)
             number = dr.gather(types.UInt32, self._numbers, slot, is_leaf)
             end, found = visit(row, number, is_leaf, end, found)
-            enters = self._meets_box(ray.origin, inverse, node, end, ~is_leaf)
-            return dr.select(enters, 2 * node, _next_after(node)), end, found
+            left, right = self._meets_children(ray.origin, inverse, node, end, ~is_leaf)
+            nearer = dr.select(right < left, 1, 0)
+            second = dr.select(greater(left, right) < dr.inf, 1, 0)
+            descends = ~is_leaf & (lesser(left, right) < dr.inf)
+            up = dr.tzcnt(trail)
+            sibling = dr.select(trail == 0, 0, (node >> up) ^ 1)
+            node = dr.select(descends, 2 * node + nearer, sibling)
+            trail = dr.select(descends, 2 * trail + second, (trail >> up) ^ 1)
+            return node, trail, end, found
 
-        state = (types.UInt32(1), end, types.UInt32(0))
-        goes_on = lambda node, end, _: active & (node > 0) & (end > 0)  # noqa: E731
-        _, end, found = dr.while_loop(state, goes_on, step)
+        # The bit of a level tells in the trail whether the other child there is still to be seen.
+        state = (types.UInt32(1), types.UInt32(0), end, types.UInt32(0))
+        goes_on = lambda node, _, end, __: active & (node > 0) & (end > 0)  # noqa: E731
+        _, _, end, found = dr.while_loop(state, goes_on, step)
         return end, found
 
-    def _meets_box(
+    def _meets_children(
         self, origin: Array3f, inverse: Array3f, node: UInt32, end: Float, inner: Bool
-    ) -> Bool:
+    ) -> tuple[Float, Float]:
+        """Where a ray enters the boxes of a node's children; infinite where it does not."""
         types = types_of(end)
-        a, b = (dr.gather(types.Array4f, self._boxes, 2 * node + k, inner) for k in range(2))
-        low, high = vec3(a[0], a[1], a[2]) - origin, vec3(a[3], b[0], b[1]) - origin
-        near: Any = types.Float32(0)
-        far: Any = end
-        for axis in range(3):
-            upward = inverse[axis] > 0
-            first, last = low[axis] * inverse[axis], high[axis] * inverse[axis]
-            near = greater(dr.select(upward, first, last), near)
-            far = lesser(dr.select(upward, last, first), far)
-        return inner & (near <= far * (1 + ROOM))
+        a, b, c = (dr.gather(types.Array4f, self._children, 3 * node + k, inner) for k in range(3))
+        left = _meets_box(origin, inverse, end, vec3(a[0], a[1], a[2]), vec3(a[3], b[0], b[1]))
+        right = _meets_box(origin, inverse, end, vec3(b[2], b[3], c[0]), vec3(c[1], c[2], c[3]))
+        return left, right
 
 
-def _next_after(node: UInt32) -> UInt32:
-    """The node to visit once all below a node are done: a sibling of it or of one above; 0 at last.
-
-    Ends of the nodes above that are right children all are, as node + 1 has trailing zeros.
-    """
-    following = node + 1
-    following = following >> dr.tzcnt(following)
-    return dr.select(following == 1, 0, following)
+def _meets_box(origin: Array3f, inverse: Array3f, end: Float, low: Array3f, high: Array3f) -> Float:
+    near: Any = types_of(end).Float32(0)
+    far: Any = end
+    for axis in range(3):
+        upward = inverse[axis] > 0
+        first, last = ((limit[axis] - origin[axis]) * inverse[axis] for limit in (low, high))
+        near = greater(dr.select(upward, first, last), near)
+        far = lesser(dr.select(upward, last, first), far)
+    return dr.select(near <= far * (1 + ROOM), near, dr.inf)
