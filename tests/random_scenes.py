@@ -5,7 +5,8 @@ All is drawn from a `random.Random`, so that a seed makes a scene again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
@@ -14,7 +15,7 @@ import drpt
 from drpt.scene.checks import MAX_LENGTH, MIN_LENGTH
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from random import Random
 
     from numpy.typing import NDArray
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from tests.oracle.arrays import Floats
 
     Ball: TypeAlias = tuple[Floats, float]
+    Paint: TypeAlias = Callable[[Random], Material]
 
 SIZES = (1e-6, 1e6)
 RADIANCES = (1e-30, 1e30)
@@ -36,7 +38,18 @@ FINEST = 1e-9
 apart, far beyond what float32 does."""
 
 LAMP_DISTANCE, LAMP_RADIUS = 5, 3
-"""Of the six lamps around a tame scene, in sizes of the scene."""
+"""Of the six lamps around a tame scene, in distances of its farthest point from the origin."""
+
+THINNEST = 1e-4
+"""Of bodies, relative to their size: thinner ones are facets only."""
+THINNEST_HOLLOW = 0.5
+"""The same of those that hold others: they are not much larger than these."""
+ROOM_MARGIN = 1.1
+"""Between a room and what it holds."""
+FLOOR = 3
+"""Size of a floor in that of what stands on it."""
+ROOMS = 0.25
+"""Share of tame scenes without lamps that a room holds; and of those with lamps."""
 
 Item = TypeVar("Item")
 
@@ -46,6 +59,7 @@ class Structure:
     """How many shapes of each kind a scene has: that decides which kernel is compiled.
 
     ``triangles`` are those of each mesh; a hundred are too many to be constants of the kernel.
+    The faces of ``bodies`` and of a ``room``, which holds all else, are constants always.
     """
 
     diffuse: int = 0
@@ -55,6 +69,32 @@ class Structure:
     smooth_meshes: int = 0
     mesh_lights: int = 0
     triangles: int = 100
+    bodies: int = 0
+    room: bool = False
+
+
+@dataclass(frozen=True)
+class Body:
+    """A convex body in the unit ball, some of its faces left out.
+
+    ``vertices`` (n, 3) are around their mean, the origin. ``faces`` are the numbers of those around
+    each face, first the two ends, of which a pyramid's second is a point. ``opening`` tells which
+    are left out.
+    """
+
+    vertices: Floats
+    faces: list[list[int]]
+    opening: list[int]
+
+    @property
+    def inradius(self) -> float:
+        """Distance of the nearest face's plane from the origin."""
+        corners = [self.vertices[face[:3]] for face in self.faces if len(face) > 2]
+        normals = [np.cross(b - a, c - a) for a, b, c in corners]
+        return min(
+            abs(float(corner @ normal)) / float(np.linalg.norm(normal))
+            for (corner, *_), normal in zip(corners, normals, strict=True)
+        )
 
 
 if TYPE_CHECKING:
@@ -71,6 +111,14 @@ def random_scene(random: Random, structure: Structure, picture: int) -> drpt.Sce
     for make in _makers(structure):
         balls.append(_within_limits(*_random_ball(random, size, place, balls)))
         shapes.append(make(random, structure, *balls[-1]))
+    for _ in range(structure.bodies):
+        balls.append(_within_limits(*_random_ball(random, size, place, balls)))
+        shapes += _random_bodies(random, *balls[-1], _random_material)
+    if structure.room:
+        center, radius = _within_limits(*_ball_around(balls))
+        room = _random_body(random, THINNEST_HOLLOW)
+        balls.append((center, ROOM_MARGIN * radius / room.inradius))
+        shapes += _meshes(random, room, *balls[-1], _random_material)
     return drpt.Scene(_random_camera(random, choose(random, balls), picture), shapes)
 
 
@@ -78,18 +126,48 @@ def tame_scene(random: Random, picture: int) -> drpt.Scene:
     """Make a scene of any size with 1 to 6 shapes and six lamps around, seen from near one of them.
 
     Shapes meet each other at random, but are small against the lamps and far from them: the light
-    that a sample finds is bounded, and its mean close to normal, in every mode.
+    that a sample finds is bounded, and its mean close to normal, in every mode. Some stand in a
+    room, without the lamps or with them, and some of these are seen from outside.
     """
     size = log_uniform(random, *SIZES)
-    shapes = [_tame_shape(random, size) for _ in range(random.randint(1, 6))]
-    camera = _close_up(random, choose(random, shapes), picture)
-    return drpt.Scene(camera, [*shapes, *_lamps(random, size)])
+    shapes = [part for _ in range(random.randint(1, 6)) for part in _tame_shapes(random, size)]
+    scene = drpt.Scene(_close_up(random, choose(random, shapes), picture), shapes)
+    if random.random() < ROOMS:
+        scene = _in_room(random, scene)
+    scene = drpt.Scene(scene.camera, [*scene.shapes, *_lamps(random, _reach(scene))])
+    return _in_room(random, scene) if random.random() < ROOMS else scene
 
 
-def _lamps(random: Random, size: float) -> list[drpt.Sphere]:
+def _in_room(random: Random, scene: drpt.Scene) -> drpt.Scene:
+    """The same scene in a room; half the cameras look from outside, into the room if it is open."""
+    room = _random_body(random, THINNEST_HOLLOW)
+    radius = ROOM_MARGIN * _reach(scene) / room.inradius
+    walls = _meshes(random, room, np.zeros(3), radius, _tame_material)
+    camera = scene.camera
+    if random.random() < 0.5:
+        face = room.opening[0] if room.opening else 0
+        outward = room.vertices[room.faces[face]].mean(axis=0)
+        eye = 2 * radius * outward / np.linalg.norm(outward)
+        up = np.eye(3)[np.abs(eye).argmin()]
+        camera = replace(camera, eye=eye, target=(0, 0, 0), up=up)
+    return drpt.Scene(camera, [*scene.shapes, *walls])
+
+
+def _reach(scene: drpt.Scene) -> float:
+    """Distance from the origin to the farthest point of a scene, its camera included."""
+    points = [np.linalg.norm(scene.camera.eye)]
+    for shape in scene.shapes:
+        if isinstance(shape, drpt.Sphere):
+            points.append(np.linalg.norm(shape.center) + shape.radius)
+        else:
+            points.append(np.linalg.norm(shape.vertices, axis=1).max())
+    return float(max(points))
+
+
+def _lamps(random: Random, reach: float) -> list[drpt.Sphere]:
     return [
         drpt.Sphere(
-            side * LAMP_DISTANCE * size * axis, LAMP_RADIUS * size, radiance=random.uniform(1, 3)
+            side * LAMP_DISTANCE * reach * axis, LAMP_RADIUS * reach, radiance=random.uniform(1, 3)
         )
         for axis in np.eye(3)
         for side in (-1, 1)
@@ -99,7 +177,7 @@ def _lamps(random: Random, size: float) -> list[drpt.Sphere]:
 def _close_up(random: Random, shape: Shape, picture: int) -> drpt.Camera:
     """From outside of a sphere, or from somewhere before or behind a mesh."""
     middle, extent, facing = _seen(random, shape)
-    view = -3 * extent * facing
+    view = -max(3 * extent, 2 * MIN_LENGTH) * facing
     up = np.eye(3)[np.abs(view).argmin()]
     return drpt.Camera(middle - view, middle, up, 20, picture, picture)
 
@@ -116,25 +194,92 @@ def _seen(random: Random, shape: Shape) -> tuple[Floats, float, Floats]:
     return middle, extent, facing / np.linalg.norm(facing)
 
 
-def _tame_shape(random: Random, size: float) -> Shape:
+def _tame_shapes(random: Random, size: float) -> list[Shape]:
+    """A shape, or a body and what stands with it."""
     center = size * any_direction(random) * random.random()
     radius = size * log_uniform(random, 1e-3, 0.3)
+    kind = choose(random, ["sphere", "sphere", "triangle", "quad", "smooth", "body"])
+    if kind == "body":
+        return _random_bodies(random, center, radius, _tame_material)
     material = _tame_material(random)
-    kind = choose(random, ["sphere", "sphere", "triangle", "quad", "smooth"])
     if kind == "sphere":
-        return drpt.Sphere(center, radius, material)
+        return [drpt.Sphere(center, radius, material)]
     a, b = normal_vector(random), normal_vector(random)
     corners = radius * np.array([-a - b, a - b, a + b, b - a]) / 2
     faces = [[0, 1, 2]] if kind == "triangle" else [[0, 1, 2], [0, 2, 3]]
     outward = np.cross(a, b) / np.linalg.norm(np.cross(a, b))
     normals = outward + 0.2 * corners / radius if kind == "smooth" else None
-    return drpt.Mesh(center + corners, faces, normals, material)
+    return [drpt.Mesh(center + corners, faces, normals, material)]
 
 
 def _tame_material(random: Random) -> Material:
     albedo = [random.uniform(0.2, 1) for _ in range(3)]
     exponent = log_uniform(random, 1, 20)
     return drpt.Diffuse(albedo) if random.random() < 0.5 else drpt.Phong(albedo, exponent)
+
+
+def _random_bodies(random: Random, center: Floats, radius: float, paint: Paint) -> list[Shape]:
+    """A body within a ball; sometimes another one in it, or a floor under it.
+
+    The floor has the material of the face that lies on it.
+    """
+    extra = choose(random, ["none", "inner", "floor"])
+    body = _random_body(random, THINNEST_HOLLOW if extra == "inner" else THINNEST)
+    shapes = _meshes(random, body, center, radius, paint)
+    if extra == "inner":
+        inner = _random_body(random, THINNEST)
+        shapes += _meshes(random, inner, center, radius * body.inradius, paint)
+    if extra == "floor":
+        corners = body.vertices[body.faces[0]]
+        middle = corners.mean(axis=0)
+        corners = center + radius * (middle + FLOOR * (corners - middle))
+        floor = _fans([range(len(corners))])
+        shapes.append(drpt.Mesh(corners, floor, material=shapes[0].material))
+    return shapes
+
+
+def _random_body(random: Random, thinnest: float) -> Body:
+    """A box, prism, pyramid or frustum, straight or skew, half of them open."""
+    count = random.randint(3, 6)
+    angles = 2 * np.pi * (np.arange(count) + 0.5) / count
+    base = np.column_stack([np.cos(angles), np.sin(angles), np.full(count, -1)])
+    taper = choose(random, [0, 1, 1, random.uniform(0.3, 1)])
+    skew = choose(random, [0, random.uniform(-0.5, 0.5)])
+    top = base[: count if taper else 1] * (taper, taper, -1) + (skew, 0, 0)
+    ends = [[*reversed(range(count))], [*range(count, count + len(top))]]
+    sides = [
+        [*dict.fromkeys((i, j, count + j % len(top), count + i % len(top)))]
+        for i, j in pairwise((*range(count), 0))
+    ]
+    vertices = np.concatenate([base, top])
+    vertices -= vertices.mean(axis=0)
+    vertices *= [random.uniform(0.5, 1) for _ in range(3)]
+    vertices[:, random.randrange(3)] *= choose(random, [1, 1, log_uniform(random, thinnest, 1)])
+    if random.random() < 0.7:
+        vertices = vertices @ np.linalg.qr([normal_vector(random) for _ in range(3)])[0]
+    vertices /= np.linalg.norm(vertices, axis=1).max()
+    opening = choose(random, [[], [], [random.randrange(2, 2 + count)], [0], [0, 1]])
+    return Body(vertices, [*ends, *sides], opening)
+
+
+def _meshes(random: Random, body: Body, center: Floats, radius: float, paint: Paint) -> list[Shape]:
+    """A body as one mesh, or as one mesh and material for each face; all share their vertices."""
+    radius = max(radius, FINEST * float(np.abs(center).max()))
+    kept = [face for i, face in enumerate(body.faces) if i not in body.opening and len(face) > 2]
+    parts = choose(random, [[kept], [[face] for face in kept]])
+    vertices = center + radius * body.vertices
+    return [drpt.Mesh(vertices, _fans(part), material=paint(random)) for part in parts]
+
+
+def _fans(polygons: Iterable[Sequence[int]]) -> list[tuple[int, int, int]]:
+    """Triangles of convex polygons."""
+    return [(a, b, c) for a, *others in polygons for b, c in pairwise(others)]
+
+
+def _random_material(random: Random) -> Material:
+    if random.random() < 0.5:
+        return drpt.Diffuse(random_albedo(random))
+    return random_phong(random)
 
 
 def random_albedo(random: Random) -> list[float]:
@@ -230,6 +375,11 @@ def _random_ball(random: Random, size: float, place: Floats, earlier: list[Ball]
         (center + radius * factor * direction, radius),
     ]
     return choose(random, balls)
+
+
+def _ball_around(balls: list[Ball]) -> Ball:
+    center = np.mean([center for center, _ in balls], axis=0)
+    return center, max(float(np.linalg.norm(c - center)) + r for c, r in balls)
 
 
 def _within_limits(center: Floats, radius: float) -> Ball:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import drpt
+from drpt.kernel.primitives import make_primitives
 from drpt.render import SAMPLERS
 from drpt.scene.saving import to_toml
 from tests.random_scenes import Structure, random_scene
@@ -49,7 +50,16 @@ FACETED = {
     "something of all": Kind(Structure(1, 1, 1, 1, 1, 1, triangles=7), 1),
     "facets and facets that emit": Kind(Structure(flat_meshes=1, mesh_lights=1, triangles=2), 2),
     "smooth facets": Kind(Structure(smooth_meshes=1, lights=1, triangles=2), 1),
+    "bodies and lamp": Kind(Structure(lights=1, bodies=2), 2),
+    "room": Kind(Structure(diffuse=1, phong=1, lights=2, room=True), 3),
+    "room with bodies": Kind(Structure(phong=1, lights=1, bodies=2, room=True), 2),
+    "room with facets that emit": Kind(
+        Structure(smooth_meshes=1, mesh_lights=1, triangles=2, bodies=1, room=True), 1
+    ),
 }
+BODIES = ("bodies and lamp", "room", "room with bodies", "room with facets that emit")
+MET_AS_BODIES = 0.9
+"""Share of the scenes of these in which a body is found; the others' are thin or far away."""
 QUICK = ("ball and lamp", "smooth mesh and lamp")
 
 
@@ -70,6 +80,20 @@ def test_no_scene_has_samples_that_are_not_finite(name: str, mode: drpt.Mode) ->
 def test_no_scene_of_facets_has_samples_that_are_not_finite(name: str) -> None:
     for seed in range(FACETED_SCENES):
         assert_finite(FACETED[name], seed, MODES[seed % len(MODES)], SAMPLERS[seed % 2])
+
+
+def test_a_room_with_bodies_has_samples_that_are_finite() -> None:
+    assert_finite(FACETED["room with bodies"], 0, drpt.Mode.MIS, "sobol")
+
+
+def test_most_scenes_with_bodies_have_some_that_are_met_as_such() -> None:
+    structures = [FACETED[name].structure for name in BODIES]
+    scenes = [
+        random_scene(Random(n), s, PICTURE) for s in structures for n in range(FACETED_SCENES)
+    ]
+    solids = [make_primitives(scene.shapes).solids for scene in scenes]
+    assert np.mean([len(found) > 0 for found in solids]) >= MET_AS_BODIES
+    assert any(body.encloses for found in solids for body in found)
 
 
 def assert_finite(kind: Kind, seed: int, mode: drpt.Mode, sampler: str) -> None:

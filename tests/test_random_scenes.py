@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, Phase, given, note, settings
 from hypothesis import strategies as st
 
 import drpt
+from drpt.kernel.primitives import make_primitives
 from drpt.scene.saving import to_toml
 from tests.measuring import Measured, measure
 from tests.oracle import path_tracer
@@ -39,10 +40,12 @@ DETECTED = 0.15
 """Relative error of a mean that every comparison sees 19 times out of 20; most see half of it."""
 ALBEDO_FAULT = 0.8
 """Factor of an albedo that has to be found."""
+BODY_SEED = 5
+"""Of a scene with a body in it, for the tests of a single one."""
 PICTURE = 16
 BOUNCES = 2
 PATHS = 2**19
-ORACLE_SPP = 600
+ORACLE_SPP = 300
 
 always_the_same = settings(
     derandomize=True,
@@ -65,16 +68,30 @@ def test_means_of_random_scenes_are_the_oracles(seed: int) -> None:
         assert_agree(measure(scene, PATHS, BOUNCES, mode), truth)
 
 
+def test_half_of_the_scenes_have_bodies() -> None:
+    scenes = [tame_scene(Random(seed), PICTURE) for seed in range(40)]
+    solids = [make_primitives(scene.shapes).solids for scene in scenes]
+    assert np.mean([len(found) > 0 for found in solids]) >= 0.5
+    assert np.mean([any(body.encloses for body in found) for found in solids]) >= 0.1
+
+
 def test_the_mean_of_a_random_scene_is_the_oracles() -> None:
-    scene = tame_scene(Random(1), PICTURE)
+    scene = tame_scene(Random(BODY_SEED), PICTURE)
     assert_agree(measure(scene, PATHS, BOUNCES, "mis"), oracle(scene))
 
 
 def test_a_wrong_albedo_is_found() -> None:
-    scene = tame_scene(Random(1), PICTURE)
+    scene = tame_scene(Random(BODY_SEED), PICTURE)
     found = measure(darker(scene, ALBEDO_FAULT), PATHS, BOUNCES, "mis")
     with pytest.raises(AssertionError, match="means differ"):
         assert_agree(found, oracle(scene))
+
+
+def test_light_where_all_is_dark_is_found() -> None:
+    dark, leak = (Measured(np.full(3, mean), np.full(3, mean)) for mean in (0.0, 1e-9))
+    assert_agree(dark, dark)
+    with pytest.raises(AssertionError, match="where all is dark"):
+        assert_agree(leak, dark)
 
 
 def darker(scene: drpt.Scene, factor: float) -> drpt.Scene:
@@ -98,6 +115,8 @@ def oracle(scene: drpt.Scene) -> Measured:
 
 
 def assert_agree(found: Measured, truth: Measured) -> None:
+    """Assert that means are the same: exactly, where the truth is 0, as in a closed room."""
+    assert (found.mean[truth.mean == 0] == 0).all(), f"{found.mean} where all is dark"
     error = np.hypot(found.standard_error, truth.standard_error)
     detected = smallest_detectable(error, SIGNIFICANCE, 3)
     assert (detected <= DETECTED * truth.mean).all(), f"detects {detected} of {truth.mean} only"

@@ -12,7 +12,7 @@ from benchmarks.stress.harness import Case
 from benchmarks.stress.intersection import NONE
 from benchmarks.stress.lights import UP, relative
 from benchmarks.stress.pictures import camera_at, mean_in_drpt, mean_in_mitsuba
-from benchmarks.stress.world import DULL, NEEDLES, beside, cube, icosphere
+from benchmarks.stress.world import DULL, NEEDLES, beside, cube, icosphere, prism
 from drpt import Camera, Diffuse, Mesh, Mode, Phong, Rendering, Scene, Sphere, render
 from drpt.film import Film
 from drpt.render import LAUNCH_LANES, plan_passes
@@ -182,15 +182,17 @@ def closed_room(name: str, shape: Callable[[Floats, float], Mesh]) -> Case:
     )
 
 
-def right_angled_room(name: str, shape: Callable[[Floats, float], Mesh]) -> tuple[Case, Case]:
-    """The same of a room whose corners are known to leak, from far away on."""
+def cornered_room(
+    name: str, shape: Callable[[Floats, float], Mesh], bound: float = 1e-5, farthest: float = 1e5
+) -> tuple[Case, Case]:
+    """The same of a room whose corners are known to leak from far away on, but within a bound."""
     near = replace(closed_room(name, shape), values=OFFSETS[:3], quick=(0.1, 10.0))
     far = replace(
         near,
         name=f"{near.name}, far away",
-        values=OFFSETS[3:],
+        values=tuple(offset for offset in OFFSETS[3:] if offset <= farthest),
         quick=(1e3,),
-        bound=1e-5,
+        bound=bound,
         reason="the limit: rounding may put a vertex in a corner behind the other wall",
     )
     return near, far
@@ -311,6 +313,9 @@ CASES = (
     ),
     closed_room("icosahedron", lambda center, size: icosphere(0, center, size)),
     closed_room("20480 triangles", lambda center, size: icosphere(5, center, size)),
-    *right_angled_room("cube", cube),
-    *right_angled_room("cube of needles 1e6 : 1", lambda c, size: cube(c, size, NEEDLES)),
+    *cornered_room("cube", cube),
+    *cornered_room("cube of needles 1e6 : 1", lambda c, size: cube(c, size, NEEDLES)),
+    *cornered_room(
+        "prism with an edge of 0.3 radians", lambda c, size: prism(c, size, 0.3), 1e-4, 1e4
+    ),
 )

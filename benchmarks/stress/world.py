@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise, product
+from itertools import chain, pairwise, product
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import drjit as dr
@@ -153,6 +153,19 @@ def cube(center: Floats, radius: float, cuts: tuple[float, ...] = (-1.0, 1.0)) -
         for axis in range(3)
     ]
     return outward(np.concatenate(faces), center, radius)
+
+
+def prism(center: Floats, radius: float, angle: float) -> Mesh:
+    """A closed prism of three walls around a point; two of them meet at that angle.
+
+    The third is ``radius`` away from the point, as the ends are; the edge is so on the other side.
+    """
+    half = 2 * np.tan(angle / 2)
+    low = np.array([(-1.0, 0, -1), (1, -half, -1), (1, half, -1)])
+    corners = np.concatenate([low, low * (1, 1, -1)])
+    ends = [(0, 1, 2), (3, 4, 5)]
+    walls = [[(i, j, j + 3), (i, j + 3, i + 3)] for i, j in ((0, 1), (1, 2), (2, 0))]
+    return outward(corners[[*ends, *chain(*walls)]], center, radius)
 
 
 def wedge(angle: float) -> Mesh:
