@@ -38,8 +38,8 @@ class Effort:
 
 FULL = Effort(
     runs=3,
-    point_seconds=5,
-    slow_point_seconds=1,
+    point_seconds=3,
+    slow_point_seconds=0.3,
     reference_spp=2**14,
     throughput_spp=256,
     scaling_seconds=10,

@@ -193,6 +193,18 @@ def test_launches_of_any_range_and_seed_compile_nothing() -> None:
         assert compiled_kernels(work) == 0
 
 
+def test_whether_rays_are_shared_compiles_nothing() -> None:
+    def work(*, share_rays: bool) -> Sums:
+        scene, mode = scene_of(room=True), Mode.EXPLICIT
+        launcher = make_launcher(TYPES, scene, 2, mode, "sobol", jitter=True, share_rays=share_rays)
+        return launcher.launch(range(64), range(8), 1, 0)
+
+    shared = work(share_rays=True)
+    plain: list[Sums] = []
+    assert compiled_kernels(lambda: plain.append(work(share_rays=False))) == 0
+    assert plain[0].rays > shared.rays
+
+
 def test_the_count_sees_a_compilation() -> None:
     """Geometry is part of the kernel: a triangle that no other test has."""
     corner = float(np.random.default_rng().uniform(1, 2))

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import drjit as dr
 
 from drpt.kernel.device_scene import Ball
-from drpt.kernel.vec import greater, lesser, types_of, vec3
+from drpt.kernel.meet import (
+    dot_constant,
+    meet_facet,
+    meet_solid,
+    meet_sphere,
+    power_of_point,
+    solid_blocks,
+)
+from drpt.kernel.vec import greater, largest, types_of, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,8 +25,6 @@ if TYPE_CHECKING:
     from drpt.kernel.camera import Ray
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
-    from drpt.kernel.facets import Facet
-    from drpt.kernel.solids import Face, Solid, Span
     from drpt.kernel.sphere_tree import SphereTree
 
 SPAWN_OFFSET = 2.0**-20
@@ -29,12 +35,6 @@ together off by about ten half ulps at the most (Wächter & Binder 2019, Ray Tra
 For a triangle of a mesh, whose test starts from its corners, those are coordinates, too. From a
 polygon it starts as far again back along the ray that has come: in a corner, a point that was
 rounded to behind the other wall returns to where that ray was.
-"""
-SKIN = SPAWN_OFFSET / 2
-"""How far outside a convex body an origin counts as inside, relative to its coordinates.
-
-Rounding may put a point in a corner of a room beyond the other wall; what has been stepped off the
-outside of a face is farther away.
 """
 COINCIDENT = 2.0**-20
 """Up to which difference surfaces are one, relative to the coordinates and the distance to them.
@@ -65,7 +65,7 @@ def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) 
     """The first surface that a ray meets."""
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
     for solid in scene.solids:
-        number, met, t = _meet_solid(ray, solid)
+        number, met, t = meet_solid(ray, solid)
         closer = met & (t < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
@@ -93,7 +93,7 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
         blocked |= _many_block(scene.sphere_tree, ray, active, target, before, beyond)
     for solid in scene.solids:
         if solid.shading:
-            blocked |= _blocks(ray, solid, before)
+            blocked |= solid_blocks(ray, solid, before)
     for number, met, t in _surfaces_and_spheres(scene, ray, active, target):
         reflects = isinstance(number, int) and number < scene.first_light
         reach = before if reflects else dr.select(number > target, beyond, before)
@@ -104,7 +104,7 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
 
 
 def _slack(ray: Ray, t: Float) -> Float:
-    return COINCIDENT * (t + _largest(ray.origin))
+    return COINCIDENT * (t + largest(ray.origin))
 
 
 def _surfaces_and_spheres(
@@ -119,9 +119,9 @@ def _surfaces_and_spheres(
         yield scene.mesh.closest(ray, active)
     for number, facet, blocks in scene.loose_facets:
         if blocks or target is None:
-            yield number, *_meet_facet(ray, facet)
+            yield number, *meet_facet(ray, facet)
     for number, ball in enumerate(scene.balls, start=scene.first_sphere):
-        met, t = _meet_sphere(ray, ball)
+        met, t = meet_sphere(ray, ball)
         is_light = number >= scene.first_light
         yield number, met & (target != number) if is_light and target is not None else met, t
     if scene.sphere_tree is not None and target is None:
@@ -134,7 +134,7 @@ def _closest_of_many(tree: SphereTree, ray: Ray, active: Bool) -> tuple[UInt32, 
     def visit(
         row: Array4f, number: UInt32, is_leaf: Bool, end: Float, found: UInt32
     ) -> tuple[Float, UInt32]:
-        met, t = _meet_sphere(ray, _ball_of(row))
+        met, t = meet_sphere(ray, _ball_of(row))
         closer = is_leaf & met & ((t < end) | ((t == end) & (number > found)))
         return dr.select(closer, t, end), dr.select(closer, number, found)
 
@@ -150,7 +150,7 @@ def _many_block(
     def visit(
         row: Array4f, number: UInt32, is_leaf: Bool, end: Float, found: UInt32
     ) -> tuple[Float, UInt32]:
-        met, t = _meet_sphere(ray, _ball_of(row))
+        met, t = meet_sphere(ray, _ball_of(row))
         reach = dr.select(number > target, beyond, before)
         blocks = is_leaf & met & (number != target) & (t < reach)
         return dr.select(blocks, -1, end), found
@@ -168,8 +168,8 @@ def _light_triangles(
     """The same of the triangles that emit, and whether a ray meets their front."""
     first = scene.first_light + scene.sphere_lights
     for number, facet in enumerate(scene.light_facets, start=first):
-        met, t = _meet_facet(ray, facet)
-        front = _dot(facet.normal, ray.direction) < 0
+        met, t = meet_facet(ray, facet)
+        front = dot_constant(facet.normal, ray.direction) < 0
         yield number, met if target is None else met & (target != number), t, front
     if scene.light_mesh is not None:
         index, met, t = scene.light_mesh.closest(ray, active)
@@ -177,134 +177,6 @@ def _light_triangles(
         row = scene.geometry_row(found, met)
         front = dr.dot(vec3(row[0], row[1], row[2]), ray.direction) < 0
         yield found, met if target is None else met & (target != found), t, front
-
-
-def _meet_solid(ray: Ray, solid: Solid) -> tuple[UInt32, Bool, Float]:
-    """Number of the facet by which a ray enters a convex body, or else leaves it, and where."""
-    passage = _pass(ray, solid.spans)
-    met, t = _surface_of(passage)
-    number = types_of(t).UInt32(0)
-    for face, at in passage.faces:
-        if face.facet is not None:
-            number = dr.select(at == t, face.facet, number)
-    return number, met, greater(t, 0)
-
-
-def _blocks(ray: Ray, solid: Solid, distance: Float) -> Bool:
-    """Whether a convex body stands on the first ``distance`` of a ray between two surfaces."""
-    met, t = _surface_of(_pass(ray, solid.shading))
-    return met & (t < distance)
-
-
-class _Passage(NamedTuple):
-    """Where a ray enters and leaves a convex body, and where it meets the plane of each face.
-
-    ``inside`` tells whether its origin is within, or no more than `SKIN` outside.
-    """
-
-    enters: Any
-    leaves: Any
-    inside: Any
-    faces: list[tuple[Face, Float]]
-
-
-def _pass(ray: Ray, spans: tuple[Span, ...]) -> _Passage:
-    """The part of a ray that is on the inner side of all planes.
-
-    A distance is not a number where a ray runs in a plane; comparisons pass over that.
-    """
-    enters: Any = -dr.inf
-    leaves: Any = dr.inf
-    inside: Any = True
-    faces: list[tuple[Face, Float]] = []
-    skin = SKIN * _largest(ray.origin)
-    for span in spans:
-        rate = dr.rcp(_dot(span.direction, ray.direction))
-        position = _dot(span.direction, ray.origin)
-        upward = rate > 0
-        for face, enters_here in ((span.low, upward), (span.high, ~upward)):
-            if face is None:
-                continue
-            height = face.offset - position
-            at = height * rate
-            enters = dr.select(enters_here, greater(at, enters), enters)
-            leaves = dr.select(enters_here, leaves, lesser(at, leaves))
-            inside = inside & (height <= skin if face is span.low else height >= -skin)
-            faces.append((face, at))
-    return _Passage(enters, leaves, inside, faces)
-
-
-def _surface_of(passage: _Passage) -> tuple[Bool, Float]:
-    """Whether and where a ray enters a convex body by its surface, or else leaves it by that.
-
-    From the skin of a face to its outside a ray leaves at once, at a distance not above 0.
-    """
-    enters, leaves, inside, faces = passage
-    openings = [at for face, at in faces if face.facet is None]
-    by_surface = _all((enters > 0) & ~inside, [at != enters for at in openings])
-    t = dr.select(by_surface, enters, leaves)
-    met = inside | (enters <= leaves) & (leaves > 0)
-    return _all(met, [at != t for at in openings]), t
-
-
-def _all(first: Bool, others: list[Bool]) -> Bool:
-    for condition in others:
-        first = first & condition
-    return first
-
-
-def _meet_facet(ray: Ray, facet: Facet) -> tuple[Bool, Float]:
-    """Meeting point with the plane, by the constants of the facet alone, and the slabs around."""
-    main = max(facet.normal, key=abs)
-    normal = tuple(x / main for x in facet.normal)
-    height = facet.offset / main - _dot(normal, ray.origin)
-    t = height * dr.rcp(_dot(normal, ray.direction))
-    point = dr.fma(ray.direction, t, ray.origin)
-    inside = t > 0
-    for slab in facet.slabs:
-        x = _dot(slab.direction, point)
-        if slab.low > -dr.inf:
-            inside &= x >= slab.low
-        if slab.high < dr.inf:
-            inside &= x <= slab.high
-    return inside, t
-
-
-def _dot(constant: tuple[float, ...], v: Array3f) -> Float:
-    """Inner product that leaves out the constant's zeros and spares its ones."""
-    terms = sorted(zip(constant, v, strict=True), key=lambda term: abs(term[0]) != 1)
-    (c, x), *others = [(c, x) for c, x in terms if c != 0]
-    total = x * c
-    for c, x in others:
-        total = dr.fma(x, c, total)
-    return total
-
-
-def _meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
-    """First meeting with a sphere beyond the origin, the ray's direction being a unit vector.
-
-    Source: Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection" (Ray Tracing
-    Gems, ch. 7). Rays that start near a large sphere are told by the power of their origin instead.
-    """
-    f = ray.origin - ball.center
-    b = -dr.dot(f, ray.direction)
-    if ball.power is None:
-        closest = dr.fma(ray.direction, b, f)
-        r2 = ball.radius * ball.radius
-        c, discriminant = dr.dot(f, f) - r2, r2 - dr.dot(closest, closest)
-    else:
-        c = _power(ball, ball.power, ray.origin)
-        discriminant = dr.fma(b, b, -c)
-    root: Any = dr.copysign(dr.sqrt(discriminant), b)
-    q = b + root
-    other = c / q
-    near, far = lesser(q, other), greater(q, other)
-    return (discriminant > 0) & (far > 0), dr.select(near > 0, near, far)
-
-
-def _power(ball: Ball, of_origin: Float, p: Array3f) -> Float:
-    """The power |p − c|² − r² of a point, from that of the origin."""
-    return dr.dot(p, p) - 2 * dr.dot(p, ball.center) + of_origin
 
 
 def _surface(
@@ -369,7 +241,7 @@ def _on_primitive(
 def _on_facet(row: Array4f, p: Array3f) -> _Place:
     normal = vec3(row[0], row[1], row[2])
     point = dr.fma(normal, row[3] - dr.dot(normal, p), p)
-    return point, normal, _largest(point)
+    return point, normal, largest(point)
 
 
 def _on_sphere(row: Array4f, p: Array3f, ray: Ray) -> _Place:
@@ -379,23 +251,19 @@ def _on_sphere(row: Array4f, p: Array3f, ray: Ray) -> _Place:
     length = dr.norm(spoke)
     normal = dr.select(length > 0, spoke * dr.rcp(length), -ray.direction)
     point = dr.fma(normal, radius, center)
-    return point, normal, _largest(point) + radius
+    return point, normal, largest(point) + radius
 
 
 def _on_large_sphere(ball: Ball, power: Float, p: Array3f) -> _Place:
     """As on a sphere, but with an error relative to p instead of the radius."""
     normal = dr.normalize(p - ball.center)
-    point = dr.fma(normal, -_power(ball, power, p) / (2 * ball.radius), p)
-    return point, normal, _largest(point)
+    point = dr.fma(normal, -power_of_point(ball, power, p) / (2 * ball.radius), p)
+    return point, normal, largest(point)
 
 
 def _on_sphere_light(row: Array4f, p: Array3f) -> _Place:
     """What ends all paths: no more of it is asked for than its side, so any normal will do."""
-    return p, p - vec3(row[0], row[1], row[2]), _largest(p)
-
-
-def _largest(v: Array3f) -> Float:
-    return greater(greater(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
+    return p, p - vec3(row[0], row[1], row[2]), largest(p)
 
 
 def _interpolated_normal(

@@ -16,7 +16,7 @@ from drpt.kernel.device_scene import DeviceScene, upload
 from drpt.kernel.estimator import Features
 from drpt.kernel.path import Tracer
 from drpt.kernel.primitives import make_primitives
-from drpt.kernel.sampler import SAMPLERS
+from drpt.kernel.sampler import SAMPLERS, SobolSampler
 from drpt.kernel.schedule import Lanes, Totals, Work
 
 if TYPE_CHECKING:
@@ -117,8 +117,8 @@ class Launcher:
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 
     def _trace(self, lanes: Lanes) -> Totals:
-        if self.paths_per_ray > 1:
-            return lanes.by_ray()
+        if self.tracer.features.shared_rays and self.sampler is SobolSampler:
+            return lanes.by_ray()  # also if each takes but one path: spp compiles nothing
         return lanes.by_vertex() if self.tracer.features.regeneration else lanes.by_path()
 
     def operations(self) -> int:
@@ -142,7 +142,8 @@ def make_launcher(
 ) -> Launcher:
     """Put a scene on the device of the backend ``types``, for kernels with what it needs.
 
-    ``share_rays`` lets paths share their camera rays where they lose little by it.
+    ``share_rays`` lets paths share their camera rays where they lose little by it; the kernel is
+    the same without.
     """
     primitives, device_scene = prepare(scene.shapes, types)
     features = Features.of(primitives, bounces, mode)

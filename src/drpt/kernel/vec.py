@@ -36,6 +36,11 @@ def lesser(a: Any, b: Any) -> Any:
     return dr.select(a < b, a, b)
 
 
+def largest(v: Array3f) -> Float:
+    """The size of the largest component."""
+    return greater(greater(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
+
+
 class Frame(NamedTuple):
     """Right-handed orthonormal basis (s, t, n)."""
 
