@@ -38,7 +38,7 @@ class Effort:
 
 FULL = Effort(
     runs=3,
-    point_seconds=3,
+    point_seconds=8,
     slow_point_seconds=0.3,
     reference_spp=2**14,
     throughput_spp=256,
