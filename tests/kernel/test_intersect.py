@@ -398,7 +398,7 @@ CLOSED = {
 }
 
 
-@pytest.mark.parametrize("as_body", [True, False])
+@pytest.mark.parametrize("as_body", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", CLOSED)
 def test_no_ray_leaves_a_closed_mesh_through_its_seams(
     name: str, as_body: bool, monkeypatch: pytest.MonkeyPatch

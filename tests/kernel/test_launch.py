@@ -100,7 +100,9 @@ def test_pixels_and_samples_are_the_same_however_they_are_launched(sampler: str)
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "shared"])
-@pytest.mark.parametrize("replicates", [2, 3, 8, 16])
+@pytest.mark.parametrize(
+    "replicates", [3, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 8, 16))]
+)
 def test_replicates_share_a_pixels_samples(replicates: int, sampler: str) -> None:
     launcher = launcher_of(sampler=sampler)
     one = launcher.launch(range(100, 110), range(8), 1, 0)

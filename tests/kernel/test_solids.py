@@ -217,7 +217,9 @@ def rays(around: float, count: int = 2**14) -> tuple[Floats, Floats]:
     return origins, normalize(directions)
 
 
-@pytest.mark.parametrize("around", [1.0, 3.0, 6.0])
+@pytest.mark.parametrize(
+    "around", [3.0, *(pytest.param(x, marks=pytest.mark.slow) for x in (1.0, 6.0))]
+)
 def test_a_body_is_met_where_its_facets_are(worlds: tuple[World, World], around: float) -> None:
     found, expected = (world.closest(*rays(around)) for world in worlds)
     assert (expected["primitive"] != MISS).mean() > 0.01
@@ -263,7 +265,9 @@ def test_a_ray_stays_in_the_room_if_rounding_has_put_its_origin_outside() -> Non
     assert (front["primitive"] == MISS).all()
 
 
-@pytest.mark.parametrize("mode", ["implicit", "explicit", "mis"])
+@pytest.mark.parametrize(
+    "mode", ["mis", *(pytest.param(m, marks=pytest.mark.slow) for m in ("implicit", "explicit"))]
+)
 @pytest.mark.parametrize("leave_out", [[], [5]])
 def test_a_room_is_dark_outside(leave_out: list[int], mode: str) -> None:
     """A lamp inside, and a camera behind the wall."""
@@ -273,7 +277,9 @@ def test_a_room_is_dark_outside(leave_out: list[int], mode: str) -> None:
     assert not drpt.render(scene, 64, 4, mode).image.any()
 
 
-@pytest.mark.parametrize("size", [10.0, 1e3, 1e5])
+@pytest.mark.parametrize(
+    "size", [1e5, *(pytest.param(x, marks=pytest.mark.slow) for x in (10, 1e3))]
+)
 def test_a_large_body_is_as_exact_as_the_places_on_it(size: float) -> None:
     """Rays that leave a tilted block, whose face passes the origin, do not meet it again."""
     corners = size * (CORNERS - (0.5, 0.5, 1.0))
@@ -291,7 +297,9 @@ def test_a_large_body_is_as_exact_as_the_places_on_it(size: float) -> None:
     assert (again["primitive"] >= 6).all()
 
 
-@pytest.mark.parametrize("mode", ["implicit", "explicit", "mis"])
+@pytest.mark.parametrize(
+    "mode", ["mis", *(pytest.param(m, marks=pytest.mark.slow) for m in ("implicit", "explicit"))]
+)
 def test_pictures_of_bodies_are_those_of_facets(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same random numbers, so but few paths differ: those that pass edges by a rounding."""
     scene = drpt.load_scene("cornell-box")

@@ -104,7 +104,7 @@ def rays(around: float) -> tuple[Floats, Floats]:
 
 
 @pytest.mark.parametrize("around", [1.0, 5.0])
-@pytest.mark.parametrize("count", [UNROLL_LIMIT + 1, 500])
+@pytest.mark.parametrize("count", [UNROLL_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
 def test_closest_hits_are_those_of_all_spheres(count: int, around: float) -> None:
     balls, (origins, directions) = Balls(count), rays(around)
     number, distance = balls.closest(origins, directions)
@@ -116,7 +116,7 @@ def test_closest_hits_are_those_of_all_spheres(count: int, around: float) -> Non
     assert distance[hit] == pytest.approx(t[hit], abs=OUTLINE)
 
 
-@pytest.mark.parametrize("count", [UNROLL_LIMIT + 1, 500])
+@pytest.mark.parametrize("count", [UNROLL_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
 def test_shadows_are_those_of_all_spheres_but_the_light(count: int) -> None:
     balls, (origins, _) = Balls(count), rays(1.0)
     for light in (0, 4):
@@ -145,6 +145,7 @@ def test_of_coincident_spheres_the_last_one_counts() -> None:
     assert (number == UNROLL_LIMIT + 8).all()
 
 
+@pytest.mark.slow
 def test_pictures_of_many_spheres_are_lit() -> None:
     rng, count = np.random.default_rng(5), 3000
     centers = rng.uniform(-1, 1, (count, 3))
