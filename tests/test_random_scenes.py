@@ -80,6 +80,7 @@ def test_the_mean_of_a_random_scene_is_the_oracles() -> None:
     assert_agree(measure(scene, PATHS, BOUNCES, "mis"), oracle(scene))
 
 
+@pytest.mark.slow
 def test_a_wrong_albedo_is_found() -> None:
     scene = tame_scene(Random(BODY_SEED), PICTURE)
     found = measure(darker(scene, ALBEDO_FAULT), PATHS, BOUNCES, "mis")

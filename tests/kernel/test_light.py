@@ -178,6 +178,7 @@ class TestCone:
     def test_directions_are_uniform_in_the_cone(self, ratio: float) -> None:
         assert self._p_value(ratio, ratio) > SIGNIFICANCE
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("ratio", WIDE)
     def test_chi2_detects_a_cone_that_is_too_wide(self, ratio: float) -> None:
         assert self._p_value(ratio, ratio * (1 + BIAS)) < SIGNIFICANCE
@@ -296,6 +297,7 @@ class TestProjectedCap:
         sampled = lit.projected / inverse  # the cosine that the sample was made with
         assert (error < CONSTANT + COSINE / sampled + COSINE / lit.cosine).all()
 
+    @pytest.mark.slow
     @above(WIDE, {"tilted": TILTED})
     def test_projected_directions_are_uniform(self, lit: Lit) -> None:
         assert self._p_value(lit, lit.sample(unit_square(SAMPLES))) > SIGNIFICANCE
@@ -334,6 +336,7 @@ CROSSINGS: dict[str, Callable[[float], float]] = {
 class TestHorizon:
     """Receivers with a cap above their horizon, across and below it."""
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("ratio", RATIOS)
     @pytest.mark.parametrize("place", CROSSINGS)
     @pytest.mark.parametrize("normal", NORMALS)

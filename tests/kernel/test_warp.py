@@ -108,6 +108,7 @@ def test_samples_follow_the_density(name: str) -> None:
     assert polar.p_value(w, tested.density, tested.edges) > SIGNIFICANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BIASED)
 def test_chi2_detects_a_biased_width(name: str) -> None:
     tested = BIASED[name]
@@ -115,6 +116,7 @@ def test_chi2_detects_a_biased_width(name: str) -> None:
     assert polar.p_value(w, tested.density, tested.edges) < SIGNIFICANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WARPS)
 def test_chi2_detects_samples_that_prefer_one_side(name: str) -> None:
     tested = WARPS[name]
