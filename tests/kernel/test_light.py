@@ -378,6 +378,13 @@ def test_a_sphere_light_is_dark_from_inside(point: Any, normal: Any) -> None:
     np.testing.assert_array_equal(to_host(sample.inverse_pdf), 0)
 
 
+@pytest.mark.parametrize("light", [SPHERE, TRIANGLE])
+def test_a_receiver_that_is_not_a_number_is_not_dark(light: Shape) -> None:
+    """Its samples are to be counted, not lost in a comparison that is false."""
+    sample = Lights.of(light).sample(unit_square(10), point=(np.nan, 0, 0))
+    assert np.isnan(to_host(sample.inverse_pdf)).all()
+
+
 class TestArea:
     """Points uniform on a light: the mean of 1 / density is the solid angle."""
 

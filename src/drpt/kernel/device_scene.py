@@ -57,7 +57,7 @@ class DeviceScene:
         Largest coordinate of each facet that shares an edge, and of each triangle of a mesh;
         0 for other facets, None without such.
     light_facets, light_mesh
-        The same for those that emit.
+        The triangles that emit, as facets where they are few, else as a mesh.
     balls, sphere_tree
         Each sphere, where they are few; else all of them.
     geometry
@@ -136,7 +136,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         light_facets=primitives.light_facets,
         light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
-        sphere_tree=None if few_spheres else SphereTree(primitives.spheres, first, types),
+        sphere_tree=None if few_spheres else SphereTree(primitives.spheres, first, types, array),
         geometry=array(np.concatenate([planes, primitives.spheres, lit_planes])),
         reflectance=array(primitives.reflectance),
         smooth=array(

@@ -139,7 +139,8 @@ class _Cap(NamedTuple):
 def _cap(scene: DeviceScene, at: Receiver, light: UInt32) -> _Cap:
     """The power of the point, d² − r², is summed up without the rounding of d.
 
-    Close to the light it decides how much of its horizon is seen.
+    Close to the light it decides how much of its horizon is seen. A point that is not a number
+    has a cap that is none, so that its samples are counted.
     """
     row = scene.geometry_row(scene.first_light + light)
     to_center = vec3(row[0], row[1], row[2]) - at.point
@@ -148,8 +149,8 @@ def _cap(scene: DeviceScene, at: Receiver, light: UInt32) -> _Cap:
     scale = dr.rcp(distance)
     power = dr.fma(to_center.x, to_center.x, -radius * radius)
     power = dr.fma(to_center.z, to_center.z, dr.fma(to_center.y, to_center.y, power))
-    sine = dr.select(power > 0, radius * scale, 0)
-    height = dr.select(power > 0, sine * sine / (1 + dr.sqrt(power) * scale), 0)
+    sine = dr.select(power <= 0, 0, radius * scale)
+    height = dr.select(power <= 0, 0, sine * sine / (1 + dr.sqrt(power) * scale))
     axis = to_center * scale
     return _Cap(axis, distance, radius, sine, height, dr.dot(axis, at.normal))
 

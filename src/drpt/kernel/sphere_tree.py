@@ -62,16 +62,21 @@ def boxes_around(spheres: Array) -> Array:
 
 
 class SphereTree:
-    """Spheres (n, 4) as centres and radii, numbered from ``first`` on."""
+    """Spheres (n, 4) as centres and radii, numbered from ``first`` on.
 
-    def __init__(self, spheres: Array, first: int, types: ModuleType) -> None:
+    ``upload`` brings numbers to the device, to memory from which rows are gathered in one piece.
+    """
+
+    def __init__(
+        self, spheres: Array, first: int, types: ModuleType, upload: Callable[[Array], Float]
+    ) -> None:
         self._leaves = 2 ** (len(spheres) - 1).bit_length()
         padded = np.full((self._leaves, 4), np.nan)
         padded[: len(spheres)] = spheres
         order = arrange(padded[:, :3])
         boxes = boxes_around(padded[order])
-        self._children = types.Float32(boxes.reshape(-1, 12).astype(np.float32).ravel())
-        self._spheres = types.Float32(padded[order].astype(np.float32).ravel())
+        self._children = upload(boxes)
+        self._spheres = upload(padded[order])
         self._numbers = types.UInt32((first + order).astype(np.uint32))
 
     def walk(
