@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.estimator import Features, Mode
-from drpt.kernel.primitives import make_primitives
+from drpt.kernel.estimator import Features, Mode, feature_facts, layout_facts
+from drpt.kernel.launch import prepare
+from drpt.kernel.primitives import UNROLL_LIMIT, make_primitives
+from tests.conftest import TYPES
 
 if TYPE_CHECKING:
+    from drpt.kernel.estimator import Fact
     from drpt.scene import Shape
 
 CAMERA = drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 40, 8, 8)
@@ -27,6 +31,14 @@ ROOM = drpt.Mesh(CUBE, HALVES, material=DIFFUSE)
 LAMP = drpt.Sphere((0, 0, 7), 1, radiance=1)
 PANEL = drpt.Mesh(CORNERS, [[0, 1, 2]], radiance=1)
 
+HOUSE = ROOM, TRIANGLE, LAMP
+MANY = UNROLL_LIMIT + 1
+LAYERS = np.concatenate([np.add(CORNERS, (0, 0, z)) for z in range(MANY)])
+STRIPES = drpt.Mesh(LAYERS, np.arange(3 * MANY).reshape(-1, 3), material=DIFFUSE)
+PANELS = drpt.Mesh(LAYERS, STRIPES.faces, radiance=1)
+BALLS = [drpt.Sphere((3 * x, 0, 0), 1, material=DIFFUSE) for x in range(MANY)]
+IMPLICIT, EXPLICIT = {"mode": "implicit"}, {"mode": "explicit"}
+
 COURSE_NAMES = {
     "IMPLICIT_UNIFORM_SAMPLING": "implicit-uniform",
     "IMPLICIT_BRDF_SAMPLING": "implicit",
@@ -40,6 +52,13 @@ def features(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> set[str]:
     primitives = make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes).shapes)
     found = asdict(Features.of(primitives, bounces, Mode(mode)))
     return {name for name, on in found.items() if on}
+
+
+def facts(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> dict[str, Fact]:
+    """All that is told of the kernel of a scene."""
+    primitives = make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes).shapes)
+    what = primitives, bounces, Mode(mode)
+    return feature_facts(*what) | layout_facts(*what)
 
 
 def test_there_are_five_modes() -> None:
@@ -161,3 +180,68 @@ def test_implicit_modes_sample_no_light(mode: str) -> None:
 
 def test_only_mis_weighs() -> None:
     assert [mode for mode in Mode if "mis" in features(BALL, LAMP, mode=mode)] == [Mode.MIS]
+
+
+def test_every_feature_is_told() -> None:
+    assert facts(BALL).keys() > set(Features.__dataclass_fields__)
+
+
+@pytest.mark.parametrize(
+    ("name", "told", "shapes", "settings"),
+    [
+        ("spheres", (True, "2 spheres"), [BALL, LAMP], {}),
+        ("triangles", (False, "there is no polygon"), [BALL, LAMP], {}),
+        ("triangles", (True, "7 polygons"), [ROOM, TRIANGLE, LAMP], {}),
+        ("interpolated_normals", (True, "1 smooth triangle"), [SMOOTH, LAMP], {}),
+        ("phong", (False, "there is no Phong surface"), [BALL, LAMP], {}),
+        ("phong", (False, "there is no light"), [SMOOTH], {}),
+        ("diffuse", (False, "light does not bounce"), [BALL, LAMP], {"bounces": 0}),
+        ("diffuse", (False, "nothing reflects"), [LAMP], {}),
+        ("emission", (True, "2 lights"), [LAMP, PANEL], {}),
+        ("direct_light", (False, "mode implicit samples no light"), [BALL, LAMP], IMPLICIT),
+        ("light_choice", (False, "there is one light"), [BALL, LAMP], {}),
+        ("light_choice", (True, "one of 2 lights at every vertex"), [BALL, LAMP, PANEL], {}),
+        ("mis", (False, "mode explicit weights nothing"), [BALL, LAMP], EXPLICIT),
+        ("regeneration", (False, "the scene is a room"), [ROOM, LAMP], {"bounces": 3}),
+        ("regeneration", (False, "2 bounces, less than 3"), [BALL, LAMP], {}),
+        ("regeneration", (True, "an open scene, up to 3 bounces"), [BALL, LAMP], {"bounces": 3}),
+        ("shared_rays", (False, "there are 2 lights"), [ROOM, LAMP, PANEL], {}),
+        ("shared_rays", (False, "the light is a triangle"), [ROOM, PANEL], {}),
+        ("shared_rays", (False, "the scene is open"), [BALL, LAMP], {}),
+        ("merged_triangles", (True, "6 of 7 facets are of several triangles"), [*HOUSE], {}),
+        ("solids", (True, "1 convex body of 6 facets"), [*HOUSE], {}),
+        ("solids", (False, "no facets are a convex body"), [TRIANGLE, LAMP], {}),
+        ("mesh", (False, "7 facets, not more than 64 of a kind"), [*HOUSE], {}),
+        ("mesh", (True, "65 triangles, more than 64"), [STRIPES, LAMP], {}),
+        ("mesh", (True, "65 triangles, more than 64"), [BALL, PANELS], {}),
+        ("sphere_tree", (False, "2 spheres, not more than 64"), [BALL, LAMP], {}),
+        ("sphere_tree", (True, "66 spheres, more than 64"), [*BALLS, LAMP], {}),
+        ("facet_shadows", (True, "1 of 7 facets can stand before a light"), [*HOUSE], {}),
+        ("facet_shadows", (False, "0 of 6 facets can stand before a light"), [ROOM, LAMP], {}),
+        ("facet_shadows", (False, "mode implicit samples no light"), [*HOUSE], IMPLICIT),
+        ("last_ray", (True, "mode mis counts the light that it runs into"), [BALL, LAMP], {}),
+        (
+            "last_ray",
+            (False, "mode explicit counts no light that it runs into"),
+            [BALL, LAMP],
+            EXPLICIT,
+        ),
+    ],
+)
+def test_reasons(
+    name: str, told: tuple[bool, str], shapes: list[Shape], settings: dict[str, Any]
+) -> None:
+    assert facts(*shapes, **settings)[name] == told
+
+
+@pytest.mark.parametrize(
+    "shapes", [[*HOUSE], [STRIPES, LAMP], [*BALLS, LAMP], [BALL, PANELS], [ROOM, LAMP]]
+)
+def test_what_is_told_is_on_the_device(shapes: list[Shape]) -> None:
+    told = {name: fact.holds for name, fact in facts(*shapes).items()}
+    _, scene = prepare(tuple(shapes), TYPES)
+    assert told["mesh"] is (scene.mesh is not None or scene.light_mesh is not None)
+    assert told["sphere_tree"] is (scene.sphere_tree is not None)
+    assert told["solids"] is (len(scene.solids) > 0)
+    loose = any(blocks for _, _, blocks in scene.loose_facets)
+    assert told["facet_shadows"] is (loose or any(solid.shading for solid in scene.solids))

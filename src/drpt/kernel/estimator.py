@@ -1,13 +1,23 @@
-"""The five estimators as static facts, and what of a scene they need in the kernel (host)."""
+"""The five estimators as static facts; what a kernel has for a scene, and why (host)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from drpt.kernel.primitives import UNROLL_LIMIT
 
 if TYPE_CHECKING:
     from drpt.kernel.primitives import Primitives
+
+    Need: TypeAlias = tuple[bool, str]
+    """A condition, and what is said where it is not met."""
+
+REGENERATION_BOUNCES = 3
+"""From so many bounces on, lanes would wait for their neighbours long enough."""
+SHARING_SPP = 64
+"""With so many samples per pixel, edges are smooth even if a few share a camera ray."""
 
 
 class Mode(StrEnum):
@@ -93,26 +103,176 @@ class Features:
     @classmethod
     def of(cls, primitives: Primitives, bounces: int, mode: Mode) -> Features:
         """Features of a kernel for these primitives, this many bounces and this mode."""
-        emission = len(primitives.radiance) > 0
-        reflection = emission and bounces > 0 and len(primitives.reflectance) > 0
-        direct_light = reflection and mode.samples_lights
-        one_sphere = len(primitives.radiance) == primitives.sphere_lights == 1
-        return cls(
-            spheres=emission and len(primitives.spheres) > 0,
-            triangles=emission and len(primitives.planes) > 0,
-            interpolated_normals=reflection and len(primitives.smooth_corners) > 0,
-            diffuse=reflection and bool(primitives.diffuse.any()),
-            phong=reflection and not primitives.diffuse.all(),
-            emission=emission,
-            direct_light=direct_light,
-            light_choice=direct_light and len(primitives.radiance) > 1,
-            sphere_light_samples=direct_light and primitives.sphere_lights > 0,
-            triangle_light_samples=direct_light and len(primitives.light_corners) > 0,
-            mis=direct_light and mode.counts_hits,
-            regeneration=reflection and bounces > 2 and not primitives.interior,
-            shared_rays=direct_light
-            and mode.samples_cones
-            and bounces > 1
-            and one_sphere
-            and primitives.interior,
-        )
+        facts = feature_facts(primitives, bounces, mode)
+        return cls(**{field.name: facts[field.name].holds for field in fields(cls)})
+
+
+class Fact(NamedTuple):
+    """Whether something is in a kernel, and why, in plain words."""
+
+    holds: bool
+    reason: str
+
+
+def feature_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+    """Decide each of the `Features` of a kernel."""
+    return {
+        **_shape_facts(primitives, bounces),
+        **_light_facts(primitives, bounces, mode),
+        **_order_facts(primitives, bounces, mode),
+    }
+
+
+def layout_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+    """Say how the primitives lie in a kernel, and which of them its rays look for.
+
+    ``merged_triangles``
+        Coplanar triangles as one facet.
+    ``solids``
+        Convex bodies, each met as a whole.
+    ``mesh``, ``sphere_tree``
+        Hierarchies of triangles and of spheres, which else are met one by one.
+    ``facet_shadows``
+        Facets that shadow rays look for.
+    ``last_ray``
+        The ray after the last bounce, which can but run into a light.
+    """
+    return {
+        **_facet_facts(primitives),
+        **_hierarchy_facts(primitives),
+        **_ray_facts(primitives, bounces, mode),
+    }
+
+
+def _shape_facts(primitives: Primitives, bounces: int) -> dict[str, Fact]:
+    lit, reflecting = _lit(primitives), _reflecting(primitives, bounces)
+    smooth, surfaces = len(primitives.smooth_corners), len(primitives.diffuse)
+    diffuse = int(primitives.diffuse.sum())
+    return {
+        "spheres": _some(len(primitives.spheres), "sphere", *lit),
+        "triangles": _some(len(primitives.planes), "polygon", *lit),
+        "interpolated_normals": _some(smooth, "smooth triangle", *reflecting),
+        "diffuse": _some(diffuse, "diffuse surface", *reflecting),
+        "phong": _some(surfaces - diffuse, "Phong surface", *reflecting),
+    }
+
+
+def _light_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+    sampling = _sampling(primitives, bounces, mode)
+    lights, spheres = len(primitives.radiance), primitives.sphere_lights
+    choice = f"one of {lights} lights at every vertex"
+    both = f"mode {mode} finds lights in two ways"
+    return {
+        "emission": _some(lights, "light"),
+        "direct_light": _decide(f"mode {mode} samples a light at every vertex", *sampling),
+        "light_choice": _decide(choice, *sampling, (lights > 1, "there is one light")),
+        "sphere_light_samples": _some(spheres, "sphere light", *sampling),
+        "triangle_light_samples": _some(lights - spheres, "triangle light", *sampling),
+        "mis": _decide(both, *sampling, (mode.counts_hits, f"mode {mode} weights nothing")),
+    }
+
+
+def _order_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+    """Decide in which order samples are traced."""
+    lights, room = len(primitives.radiance), primitives.interior
+    few = f"{_number(bounces, 'bounce')}, less than {REGENERATION_BOUNCES}"
+    return {
+        "regeneration": _decide(
+            f"an open scene, up to {bounces} bounces",
+            *_reflecting(primitives, bounces),
+            (bounces >= REGENERATION_BOUNCES, few),
+            (not room, "the scene is a room"),
+        ),
+        "shared_rays": _decide(
+            f"a room, lit by one sphere; from {SHARING_SPP} samples per pixel on, by Sobol' points",
+            *_sampling(primitives, bounces, mode),
+            (mode.samples_cones, f"mode {mode} samples the far sides of lights, too"),
+            (bounces > 1, "1 bounce: all noise is of the first vertex"),
+            (lights == 1, f"there are {lights} lights"),
+            (primitives.sphere_lights == 1, "the light is a triangle"),
+            (room, "the scene is open"),
+        ),
+    }
+
+
+def _facet_facts(primitives: Primitives) -> dict[str, Fact]:
+    lit, facets, solids = _lit(primitives), primitives.facets, primitives.solids
+    merged = sum(len(facet.corners) > 3 for facet in facets)
+    several = f"{merged} of {_number(len(facets), 'facet')} are of several triangles"
+    bodies = "1 convex body" if len(solids) == 1 else f"{len(solids)} convex bodies"
+    in_bodies = sum(len(solid.facets) for solid in solids)
+    return {
+        "merged_triangles": _decide(several, *lit, (merged > 0, "no triangles share a plane")),
+        "solids": _decide(
+            f"{bodies} of {_number(in_bodies, 'facet')}",
+            *lit,
+            (len(solids) > 0, "no facets are a convex body"),
+        ),
+    }
+
+
+def _hierarchy_facts(primitives: Primitives) -> dict[str, Fact]:
+    lit, spheres = _lit(primitives), len(primitives.spheres)
+    facets = len(primitives.facets) + len(primitives.light_facets)
+    triangles = len(primitives.planes) - facets
+    return {
+        "mesh": _decide(
+            f"{triangles} triangles, more than {UNROLL_LIMIT}",
+            *lit,
+            (triangles > 0, f"{_number(facets, 'facet')}, not more than {UNROLL_LIMIT} of a kind"),
+        ),
+        "sphere_tree": _decide(
+            f"{spheres} spheres, more than {UNROLL_LIMIT}",
+            *lit,
+            (spheres > UNROLL_LIMIT, f"{_number(spheres, 'sphere')}, not more than {UNROLL_LIMIT}"),
+        ),
+    }
+
+
+def _ray_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+    facets, blockers = len(primitives.facets), sum(primitives.blockers())
+    return {
+        "facet_shadows": _decide(
+            f"{blockers} of {_number(facets, 'facet')} can stand before a light",
+            *_sampling(primitives, bounces, mode),
+            (blockers > 0, f"0 of {_number(facets, 'facet')} can stand before a light"),
+        ),
+        "last_ray": _decide(
+            f"mode {mode} counts the light that it runs into",
+            *_reflecting(primitives, bounces),
+            (mode.counts_hits, f"mode {mode} counts no light that it runs into"),
+        ),
+    }
+
+
+def _lit(primitives: Primitives) -> tuple[Need, ...]:
+    return ((len(primitives.radiance) > 0, "there is no light"),)
+
+
+def _reflecting(primitives: Primitives, bounces: int) -> tuple[Need, ...]:
+    return (
+        *_lit(primitives),
+        (bounces > 0, "light does not bounce"),
+        (len(primitives.reflectance) > 0, "nothing reflects"),
+    )
+
+
+def _sampling(primitives: Primitives, bounces: int, mode: Mode) -> tuple[Need, ...]:
+    return (
+        *_reflecting(primitives, bounces),
+        (mode.samples_lights, f"mode {mode} samples no light"),
+    )
+
+
+def _decide(reason: str, *needs: Need) -> Fact:
+    """In, for a reason, unless something is missing: then out, for the first that is."""
+    missing = (Fact(False, otherwise) for met, otherwise in needs if not met)
+    return next(missing, Fact(True, reason))
+
+
+def _some(count: int, what: str, *needs: Need) -> Fact:
+    return _decide(_number(count, what), *needs, (count > 0, f"there is no {what}"))
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}{'s' if count != 1 else ''}"

@@ -125,16 +125,18 @@ class Primitives:
         """The convex bodies among the facets."""
         return make_solids([facet.corners for facet in self.facets], *self._balls())
 
-    @property
+    @cached_property
     def interior(self) -> bool:
         """Whether a body or a sphere holds all of the scene."""
+        return any(solid.encloses for solid in self.solids) or self._in_a_sphere()
+
+    def _in_a_sphere(self) -> bool:
+        if not len(self.spheres):
+            return False
         points, radii = self._balls()
-        return any(solid.encloses for solid in self.solids) or any(
-            bool(
-                (np.linalg.norm(points - row[:3], axis=1) + radii <= (1 + COPLANAR) * row[3]).all()
-            )
-            for row in self.spheres
-        )
+        *center, radius = self.spheres[self.spheres[:, 3].argmax()]  # no smaller one holds it
+        reach = np.linalg.norm(points - center, axis=1) + radii
+        return bool((reach <= (1 + COPLANAR) * radius).all())
 
     def _balls(self) -> tuple[Array, Array]:
         """Centres (n, 3) and radii (n,) of balls whose convex hull is that of the scene."""
