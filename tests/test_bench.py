@@ -79,6 +79,12 @@ def test_time_outside_of_the_points_goes_as_one_over_error(target: float) -> Non
     assert extrapolated
 
 
+def test_time_beyond_the_last_point_goes_on_along_the_slope() -> None:
+    time, extrapolated = metrics.time_to(0.001, [1.0, 2.0], [0.4, 0.1])  # error ∝ 1 / time²
+    assert time == pytest.approx(20, rel=ROUNDING)
+    assert extrapolated
+
+
 def test_one_point_has_no_slope() -> None:
     assert metrics.slope([1.0], [1.0]) is None
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -35,9 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with TemporaryDirectory() as kernels:  # of this run alone, so that first calls do compile
         os.environ["DRJIT_CACHE_DIR"] = kernels
         os.environ["DRPT_BACKEND"] = "llvm"
-        measured = measure(args.areas or AREAS, QUICK if args.quick else FULL, args.output)
-    results = merged(args.output / "results.json", measured)
-    (args.output / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+        results = measure(args.areas or AREAS, QUICK if args.quick else FULL, args.output)
     (args.output / "results.md").write_text(report(results))
     if results.get("error"):
         plot_error(results["error"], args.output / "error.png")
@@ -47,17 +46,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def measure(areas: Sequence[str], effort: Effort, output: Path) -> dict[str, Any]:
-    """Measure the areas in their order; the results of each by its name."""
+    """Measure the areas in their order, and write what there is after each part of them."""
+    path = output / "results.json"
+    conditions = {"machine": machine(), "versions": versions(), "quick": effort.quick}
+    results = merged(path, conditions)
+
+    def keep(area: str, found: Any) -> None:
+        results[area] = found
+        path.write_text(json.dumps(results, indent=1) + "\n")
+
     measures: dict[str, Callable[[], Any]] = {
         "startup": lambda: startup.measure_all(effort),
         "throughput": lambda: throughput.measure_all(effort),
-        "error": lambda: error_against_time.measure_all(effort, output / "references"),
+        "error": lambda: error_against_time.measure_all(
+            effort, output / "references", partial(keep, "error")
+        ),
         "growth": lambda: growth.measure_all(effort),
         "scaling": lambda: scaling.measure_all(effort),
     }
-    found = {area: measures[area]() for area in measures if area in areas}
-    conditions = {"machine": machine(), "versions": versions(), "quick": effort.quick}
-    return {**conditions, **found}
+    for area, measure_area in measures.items():
+        if area in areas:
+            keep(area, measure_area())
+    return results
 
 
 def merged(path: Path, measured: dict[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from drpt import Mode
 from drpt.render import SAMPLERS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from benchmarks.bench.effort import Effort
@@ -47,12 +47,15 @@ class Point:
     mrays_per_s: float | None
 
 
-def measure_all(effort: Effort, cache: Path) -> list[dict[str, Any]]:
-    """Measure every configuration, or the first one of a quick run."""
-    chosen = configurations()[:1] if effort.quick else configurations()
-    return [
-        measure(configuration, fitting(configuration), effort, cache) for configuration in chosen
-    ]
+def measure_all(
+    effort: Effort, cache: Path, keep: Callable[[list[dict[str, Any]]], None]
+) -> list[dict[str, Any]]:
+    """Measure every configuration, or the first one of a quick run; ``keep`` what there is."""
+    measured = []
+    for configuration in configurations()[:1] if effort.quick else configurations():
+        measured.append(measure(configuration, fitting(configuration), effort, cache))
+        keep(measured)
+    return measured
 
 
 def fitting(configuration: Configuration) -> dict[str, Factory]:

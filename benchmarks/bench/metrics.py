@@ -68,13 +68,14 @@ def slope(seconds: Sequence[float], errors: Sequence[float]) -> float | None:
 def time_to(target: float, seconds: Sequence[float], errors: Sequence[float]) -> Reach:
     """Seconds to an error, by a line through two neighbouring points in log–log.
 
-    Outside of the points, error falls as 1 / time from the nearest one, as that of independent
-    samples does.
+    Beyond the last point, error goes on to fall by the slope of the last decade; before the first
+    one, as 1 / time.
     """
     inside = [i for i in range(1, len(errors)) if errors[i] <= target < errors[i - 1]]
     if not inside:
-        nearest = 0 if errors[0] <= target else -1
-        return Reach(float(seconds[nearest] * errors[nearest] / target), True)
+        reached = errors[0] <= target
+        nearest, power = (0, -1.0) if reached else (-1, slope(seconds, errors) or -1.0)
+        return Reach(float(seconds[nearest] * (target / errors[nearest]) ** (1 / power)), True)
     pair = slice(inside[0] - 1, inside[0] + 1)
     log_errors, log_seconds = np.log(errors[pair])[::-1], np.log(seconds[pair])[::-1]
     return Reach(float(np.exp(np.interp(np.log(target), log_errors, log_seconds))), False)
