@@ -2,7 +2,7 @@
 BIN := .venv/bin
 STAMP := .venv/.stamp
 
-.PHONY: demo test test-quick lint format references stress bench lock clean
+.PHONY: demo test test-quick lint format references stress docs bench lock clean
 
 demo: $(STAMP)  ## render the Cornell box
 	@mkdir -p out
@@ -29,6 +29,9 @@ references: $(STAMP)  ## make Mitsuba's pictures in reference/ again, a quarter 
 
 stress: $(STAMP)  ## numbers at the edges: a table of errors and bounds; fails where one is exceeded
 	$(BIN)/python -m benchmarks.stress
+
+docs: $(STAMP)  ## build the documentation to out/docs
+	$(BIN)/python -m sphinx -b html -W --keep-going -q docs out/docs
 
 bench: $(STAMP)  ## error against time, beside Mitsuba: tables and plots in out/bench, 20 minutes
 	$(BIN)/python -m benchmarks.bench

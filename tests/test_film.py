@@ -1,105 +1,164 @@
-"""Streaming mean and variance against NumPy's."""
+"""Sums of samples and of blocks of them, against NumPy's."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from drpt.film import Film
+from drpt.film import BLOCKS, Film
 
 if TYPE_CHECKING:
     from tests.oracle.arrays import Floats
 
 ROUNDING = 1e-12  # of float64
+SINGLE = 1e-6  # of float32 sums of few runs
+DRIFT = 1e-4  # of float32 sums of a thousand passes; far below the noise of what they hold
 PIXELS = 7
 
 
-def passes(counts: list[int], seed: int = 0) -> list[Floats]:
-    """Samples (count, pixels, 3) of each pass."""
-    rng = np.random.default_rng(seed)
-    return [rng.lognormal(0, 1, (count, PIXELS, 3)) for count in counts]
+def random_samples(count: int, seed: int = 0) -> Floats:
+    """Samples (count, pixels, 3)."""
+    return np.random.default_rng(seed).lognormal(0, 1, (count, PIXELS, 3))
 
 
-def film_of(samples: list[Floats], parts: list[range] | None = None) -> Film:
-    film = Film(PIXELS)
-    for values in samples:
-        for part in parts or [range(PIXELS)]:
-            sums = values.sum(axis=0)[part.start : part.stop]
-            film.add(part, sums, len(values))
+def sums_of(samples: Floats, run: int) -> Floats:
+    """Sums of runs of samples."""
+    return np.add.reduceat(samples, np.arange(0, len(samples), run), axis=0)
+
+
+def expose(
+    film: Film,
+    samples: Floats,
+    passes: list[tuple[int, int]],
+    parts: tuple[range, ...] = (range(PIXELS),),
+) -> Film:
+    """Add the samples that follow in passes of (samples, run), each in parts of some pixels."""
+    for count, run in passes:
+        numbers = range(film.samples, film.samples + count)
+        sums = sums_of(samples[numbers.start : numbers.stop], run)
+        for part in parts:
+            film.add(part, sums[:, part.start : part.stop], numbers, run)
     return film
 
 
-def test_an_empty_film_is_black_and_knows_no_variance() -> None:
+def test_an_empty_film_is_black_and_has_no_blocks() -> None:
     film = Film(PIXELS)
-    assert film.passes == 0
-    assert not film.mean.any()
+    assert (film.samples, film.ahead) == (0, 0)
     assert film.mean.shape == (PIXELS, 3)
-    assert np.isnan(film.variance).all()
+    assert not film.mean.any()
+    assert film.leading_blocks.shape == (0, PIXELS, 3)
 
 
-@pytest.mark.parametrize("counts", [[5], [4, 4, 4], [8, 8, 3], [1, 1]])
-def test_mean_is_that_of_all_samples(counts: list[int]) -> None:
-    samples = passes(counts)
-    film = film_of(samples)
-    assert film.passes == len(counts)
-    assert film.mean == pytest.approx(np.concatenate(samples).mean(axis=0), rel=ROUNDING)
+@pytest.mark.parametrize("blocks", [True, False])
+@pytest.mark.parametrize("passes", [[(5, 1)], [(4, 2)] * 3, [(8, 4), (8, 4), (3, 1)], [(64, 8)]])
+def test_mean_is_that_of_all_samples(passes: list[tuple[int, int]], blocks: bool) -> None:
+    count = sum(n for n, _ in passes)
+    samples = random_samples(count)
+    film = expose(Film(PIXELS, blocks=blocks), samples, passes)
+    assert film.samples == count
+    assert film.mean == pytest.approx(samples.mean(axis=0), rel=ROUNDING)
 
 
-def test_one_pass_tells_no_variance() -> None:
-    assert np.isnan(film_of(passes([4])).variance).all()
+@pytest.mark.parametrize("count", [*range(2, 40), 64, 100, 127, 128, 1000])
+@pytest.mark.parametrize(("every", "run"), [(1, 1), (4, 2), (16, 16), (16, 4)])
+def test_leading_blocks_are_the_first_samples_in_equal_runs(
+    count: int, every: int, run: int
+) -> None:
+    samples = random_samples(count)
+    passes = [(min(every, count - start), run) for start in range(0, count, every)]
+    film = expose(Film(PIXELS), samples, passes)
+    blocks = film.leading_blocks
+    if count < 2 * run:
+        assert len(blocks) == 0
+        return
+    assert film.size.bit_count() == 1
+    assert len(blocks) == (4 if count >= 4 * run else 2)
+    covered = len(blocks) * film.size
+    assert covered <= count < 2 * covered
+    assert blocks.dtype == np.float32
+    assert blocks == pytest.approx(sums_of(samples[:covered], film.size), rel=SINGLE)
 
 
-def test_variance_of_equal_passes_is_that_of_their_means() -> None:
-    samples = passes([16] * 5)
-    means = np.array([values.mean(axis=0) for values in samples])
-    expected = means.var(axis=0, ddof=1) / len(means)
-    assert film_of(samples).variance == pytest.approx(expected, rel=ROUNDING)
+@pytest.mark.parametrize("passes", [[(16, 16)], [(16, 2), (16, 4), (32, 8), (64, 64), (37, 4)]])
+def test_runs_of_growing_passes_are_joined(passes: list[tuple[int, int]]) -> None:
+    samples = random_samples(sum(n for n, _ in passes))
+    film = expose(Film(PIXELS), samples, passes)
+    covered = len(film.leading_blocks) * film.size
+    assert film.leading_blocks == pytest.approx(sums_of(samples[:covered], film.size), rel=SINGLE)
+    assert film.size >= max(run for _, run in passes)
+    assert len(samples) < 2 * covered or not covered
 
 
-def test_variance_weighs_passes_by_their_samples() -> None:
-    counts = [8, 8, 2]
-    samples = passes(counts)
-    means = np.array([values.mean(axis=0) for values in samples])
-    mean = np.average(means, axis=0, weights=counts)
-    spread = np.average((means - mean) ** 2, axis=0, weights=counts)
-    assert film_of(samples).variance == pytest.approx(spread / (len(counts) - 1), rel=ROUNDING)
+def test_half_of_the_blocks_or_more_are_full() -> None:
+    film, samples = Film(PIXELS), random_samples(1000)
+    expose(film, samples, [(BLOCKS // 2, 1)])
+    while film.samples < len(samples) - 3:
+        expose(film, samples, [(3, 1)])
+        assert BLOCKS // 2 <= film.samples // film.size < BLOCKS
 
 
-def test_variance_is_unbiased_over_many_films() -> None:
-    """Each estimate is as noisy as 7 degrees of freedom make it; their mean is known to 2 %."""
-    estimates = np.array([film_of(passes([4] * 8, seed)).variance for seed in range(600)])
-    truth = (np.exp(1) - 1) * np.exp(1) / 32  # of a log-normal value, over 32 samples
-    assert estimates.mean() == pytest.approx(truth, rel=0.1)
+def test_no_blocks_are_kept_where_none_are_wanted() -> None:
+    film = expose(Film(PIXELS, blocks=False), random_samples(64), [(16, 1)] * 4)
+    assert film.leading_blocks.shape == (0, PIXELS, 3)
+    assert film.state["blocks"].size == 0
+
+
+PARTS = (range(3), range(3, 4), range(4, PIXELS))
 
 
 def test_parts_add_up_to_the_same_bits() -> None:
-    samples = passes([4, 4, 2])
-    whole, parts = film_of(samples), film_of(samples, [range(3), range(3, 4), range(4, PIXELS)])
+    samples, passes = random_samples(90), [(16, 2), (16, 2), (32, 4), (26, 4)]
+    whole = expose(Film(PIXELS), samples, passes)
+    parts = expose(Film(PIXELS), samples, passes, PARTS)
     assert np.array_equal(whole.mean, parts.mean)
-    assert np.array_equal(whole.variance, parts.variance)
-    assert parts.passes == 3
+    assert np.array_equal(whole.leading_blocks, parts.leading_blocks)
+    assert (parts.samples, parts.size) == (whole.samples, whole.size) == (90, 16)
 
 
 def test_a_pass_counts_once_all_its_parts_are_there() -> None:
-    film = Film(PIXELS)
-    film.add(range(3), np.ones((3, 3)), 1)
-    assert film.passes == 0
-    assert film.mean[:3].tolist() == [[1, 1, 1]] * 3
-    film.add(range(3, PIXELS), np.ones((PIXELS - 3, 3)), 1)
-    assert film.passes == 1
+    samples = random_samples(32)
+    film = expose(Film(PIXELS), samples, [(8, 1)])
+    sums = sums_of(samples[8:], 4)
+    film.add(range(3), sums[:, :3], range(8, 32), 4)
+    assert (film.samples, film.ahead) == (8, 3)
+    assert film.mean[:3] == pytest.approx(samples[:, :3].mean(axis=0), rel=ROUNDING)
+    assert film.mean[3:] == pytest.approx(samples[:8, 3:].mean(axis=0), rel=ROUNDING)
+    assert len(film.leading_blocks) == 0
+    film.add(range(3, PIXELS), sums[:, 3:], range(8, 32), 4)
+    assert (film.samples, film.ahead) == (32, 0)
+    assert len(film.leading_blocks) == 4
+    assert film.mean == pytest.approx(samples.mean(axis=0), rel=ROUNDING)
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+@pytest.mark.parametrize("before", [1, 3, 16, 48])
+def test_a_restored_film_goes_on_with_the_same_bits(before: int, blocks: bool) -> None:
+    samples = random_samples(before + 200)
+    film = expose(Film(PIXELS, blocks=blocks), samples, [(before, 1)])
+    copy = Film(PIXELS, blocks=blocks)
+    state: dict[str, Any] = film.state
+    copy.restore(**state, samples=film.samples, size=film.size)
+    for later in ([], [(30, 2)], [(170, 8)]):
+        assert np.array_equal(expose(copy, samples, later).mean, expose(film, samples, later).mean)
+        assert np.array_equal(copy.leading_blocks, film.leading_blocks)
+        assert (copy.samples, copy.size) == (film.samples, film.size)
 
 
 def test_many_equal_passes_stay_exact() -> None:
     film = Film(1)
-    for _ in range(10_000):
-        film.add(range(1), np.full((1, 3), 0.1 * 1024), 1024)
+    for k in range(10_000):
+        film.add(range(1), np.full((1, 1, 3), 0.1 * 1024), range(1024 * k, 1024 * (k + 1)), 1024)
     assert film.mean == pytest.approx(0.1, rel=ROUNDING)
-    assert film.variance == pytest.approx(0, abs=1e-25)
+    assert film.leading_blocks == pytest.approx(0.1 * film.size, rel=DRIFT)
 
 
-def test_values_that_are_not_finite_show() -> None:
-    film = film_of(passes([2]))
-    film.add(range(PIXELS), np.full((PIXELS, 3), np.inf), 2)
-    assert not np.isfinite(film.mean).any()
+@pytest.mark.parametrize("value", [np.inf, np.nan])
+def test_values_that_are_not_finite_show_in_their_pixel_alone(value: float) -> None:
+    samples = random_samples(64)
+    samples[40, 2] = value
+    film = expose(Film(PIXELS), samples, [(16, 1)] * 4)
+    for found in (film.mean, *film.leading_blocks):
+        assert np.isfinite(np.delete(found, 2, axis=0)).all()
+    assert not np.isfinite(film.mean[2]).any()

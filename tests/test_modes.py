@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from itertools import combinations
 from math import log2
@@ -411,10 +410,9 @@ def test_samplers_agree(reference: Measured) -> None:
 
 
 def test_pass_plans_agree(monkeypatch: pytest.MonkeyPatch, reference: Measured) -> None:
-    module = sys.modules["drpt.render"]
-    monkeypatch.setattr(module, "LAUNCH_PATHS", 2**17)
-    monkeypatch.setattr(module, "LAUNCH_PIXELS", 1000)
-    monkeypatch.setattr(module, "LAUNCH_LANES", 2**13)
+    monkeypatch.setattr("drpt.plan.LAUNCH_PATHS", 2**17)
+    monkeypatch.setattr("drpt.plan.LAUNCH_PIXELS", 1000)
+    monkeypatch.setattr("drpt.plan.LAUNCH_LANES", 2**13)
     assert_agree(measure(small_scene(), 2**21, 2, "mis", reflected=True), reference, 4 * UNCHANGED)
 
 

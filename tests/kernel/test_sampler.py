@@ -244,7 +244,7 @@ class TestIndependence:
         camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), fov=40, width=4, height=4)
         launcher = Rendering(Scene(camera, shapes), bounces=1, sampler=name).launcher()
         images = [
-            launcher.launch(range(16), range(start, start + 64), 1, 0).radiance
+            launcher.launch(range(16), range(start, start + 64), 64, 0).radiance
             for start in (0, 2**32, 2**33, 2**34)
         ]
         lit = images[0] > 0

@@ -44,7 +44,7 @@ def test_paths_that_start_where_others_end_are_the_same(
     """Down to the last bit of each, and in number, although lanes take turns elsewhere."""
     by_vertex, by_path = (
         launcher_of(name, mode, bounces, sampler, regeneration=on).launch(
-            range(20_000, 20_400), range(3, 14), 3, 5
+            range(20_000, 20_400), range(3, 14), 4, 5
         )
         for on in (True, False)
     )

@@ -9,7 +9,6 @@ import numpy as np
 
 from drpt.crosscheck.convert import to_mitsuba
 from drpt.crosscheck.variant import scoped_variant
-from drpt.film import Film
 from drpt.kernel import backend
 from drpt.render import Mode, Rendering
 
@@ -143,11 +142,17 @@ def check_spp(spp: int) -> int:
 def _estimate(
     scene: Scene, spp: int, sums: Iterator[NDArray[np.float64]], on_pass: OnPass
 ) -> Estimate:
-    """Take the mean and its variance of the sums of passes, (pixels, 3) each."""
+    """Take the mean and its variance of the sums of equal passes, (pixels, 3) each.
+
+    Source: Welford 1962, "Note on a Method for Calculating Corrected Sums of Squares and Products".
+    """
     camera = scene.camera
-    film = Film(camera.width * camera.height)
-    for radiance in sums:
-        film.add(range(len(film.mean)), radiance, spp // PASSES)
-        on_pass(film.passes)
     shape = camera.height, camera.width, 3
-    return Estimate(film.mean.reshape(shape), film.variance.reshape(shape), PASSES, spp)
+    mean, spread = np.zeros(shape), np.zeros(shape)
+    with np.errstate(invalid="ignore"):  # an infinite sample leaves a spread that is NaN
+        for number, radiance in enumerate(sums, start=1):
+            deviation = radiance.reshape(shape) * (PASSES / spp) - mean
+            mean += deviation / number
+            spread += deviation**2 * (1 - 1 / number)
+            on_pass(number)
+    return Estimate(mean, spread / ((PASSES - 1) * PASSES), PASSES, spp)

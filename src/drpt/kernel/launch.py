@@ -38,8 +38,8 @@ PATHS_PER_RAY = 4
 class Sums(NamedTuple):
     """Sums over the samples of a launch.
 
-    ``radiance`` of each pixel, (pixels, 3) or with more axes before; how many ``rays`` were traced;
-    how many samples were ``non_finite``.
+    ``radiance`` of each pixel, (runs or passes, pixels, 3); how many ``rays`` were traced; how many
+    samples were ``non_finite``.
     """
 
     radiance: NDArray[np.float64]
@@ -62,50 +62,52 @@ class Launcher:
     jitter: bool
     paths_per_ray: int
 
-    def launch(self, pixels: range, samples: range, replicates: int, seed: int) -> Sums:
-        """Trace a range of samples of each pixel in a range.
+    def launch(self, pixels: range, samples: range, run: int, seed: int) -> Sums:
+        """Trace a range of samples of each pixel in a range, in runs of so many after each other.
 
-        Each pixel takes ``replicates`` lanes that share its samples, each every so manyth. All of
-        the arguments are inputs of one and the same kernel.
+        A lane takes a run; ``radiance`` is (runs, pixels, 3). Paths that share a camera ray are in
+        the same run. All of the arguments are inputs of one and the same kernel.
         """
-        lanes = self._launch(pixels, samples, replicates, replicates, _word_of(seed, samples))
-        return lanes._replace(radiance=lanes.radiance.sum(axis=0))
+        work = self._work(pixels, samples, run, _word_of(seed, samples))
+        runs = max(1, -(-work.rays // work.run))
+        return self._launch(work._replace(sharing=runs), runs)
 
     def launch_passes(self, pixels: range, samples: range, passes: range, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range, once in each independent pass.
 
-        The same kernel as that of :meth:`launch`; ``radiance`` is (passes, pixels, 3) here.
+        The same kernel as that of :meth:`launch`; ``radiance`` is (passes, pixels, 3).
         """
-        return self._launch(pixels, samples, len(passes), 1, _seed_word(seed) + passes.start)
+        work = self._work(pixels, samples, len(samples), _seed_word(seed) + passes.start)
+        return self._launch(work, len(passes))
 
-    def _launch(
-        self, pixels: range, samples: range, lanes: int, sharing: int, seed_word: int
-    ) -> Sums:
-        """Trace with several lanes for each pixel; ``radiance`` is (lanes, pixels, 3).
-
-        So many after each other are ``sharing`` the samples of a seed; the next ones take the next.
-        """
-        if not self.tracer.features.emission:
-            return Sums(np.zeros((lanes, len(pixels), 3)), 0, 0)
-        index = self.tracer.scene.types.UInt32
+    def _work(self, pixels: range, samples: range, run: int, seed_word: int) -> Work:
         start, paths = samples.start & 0xFFFFFFFF, self.paths_per_ray
-        work = Work(
+        stop = start % paths + len(samples)
+        return Work(
             first_pixel=pixels.start,
             pixels=len(pixels),
             paths=paths,
             first_ray=start // paths,
             skipped=start % paths,
-            stop=start % paths + len(samples),
-            sharing=sharing,
+            stop=stop,
+            rays=-(-stop // paths),
+            run=-(-run // paths),
+            sharing=1,
             seed=seed_word & 0xFFFFFFFF,
         )
+
+    def _launch(self, work: Work, lanes: int) -> Sums:
+        """Trace with so many lanes for each pixel; ``radiance`` is (lanes, pixels, 3)."""
+        if not self.tracer.features.emission:
+            return Sums(np.zeros((lanes, work.pixels, 3)), 0, 0)
+        index = self.tracer.scene.types.UInt32
         totals = self._trace(
             Lanes(
                 self.tracer,
                 self.camera,
                 self.sampler,
                 jitter=self.jitter,
-                lane=dr.arange(index, len(pixels) * lanes),
+                lane=dr.arange(index, work.pixels * lanes),
                 work=Work(*(dr.opaque(index, n) for n in work)),
             )
         )
@@ -113,7 +115,7 @@ class Launcher:
             dr.eval(*totals)
             dr.sync_thread()
         by_lane = np.stack([np.array(channel) for channel in totals.radiance], axis=-1)
-        by_pixel = by_lane.reshape(lanes, len(pixels), 3)
+        by_pixel = by_lane.reshape(lanes, work.pixels, 3)
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 
     def _trace(self, lanes: Lanes) -> Totals:

@@ -32,6 +32,8 @@ class Work(NamedTuple):
     first_ray: Any
     skipped: Any
     stop: Any
+    rays: Any  # up to the one of the last sample
+    run: Any  # camera rays that a lane takes at the most
     sharing: Any  # lanes that share the samples of a seed
     seed: Any
 
@@ -57,8 +59,7 @@ class Lanes:
     """Lanes of a launch: a pixel each, and which of its samples.
 
     Lane number k takes the pixel k mod ``pixels``; of those with the same pixel, so many as
-    ``sharing`` share the samples of one seed, each every so manyth, and the next ones take the
-    next seed.
+    ``sharing`` take the samples of one seed, a run each, and the next ones take the next seed.
     """
 
     def __init__(
@@ -77,7 +78,8 @@ class Lanes:
         self.work, self.types = work, types_of(lane)
         self.pixel = work.first_pixel + lane - number * work.pixels
         self.seed = work.seed + which
-        self.start = number - which * work.sharing
+        self.first = (number - which * work.sharing) * work.run
+        self.last = dr.minimum(self.first + work.run, work.rays)
         self.count = len(lane)
 
     def by_path(self) -> Totals:
@@ -88,9 +90,9 @@ class Lanes:
             sampler = self._sampler(first_sample + sample)
             first = self.tracer.first_vertex(self._camera_ray(sampler), sampler)
             traced = self.tracer.follow(first, sampler)
-            return sample + self.work.sharing, *Totals(*totals).plus(*traced)
+            return sample + 1, *Totals(*totals).plus(*traced)
 
-        return Totals(*self._loop(add_path, lambda sample, *_: sample < self.work.stop))
+        return Totals(*self._loop(add_path, lambda sample, *_: sample < self.last))
 
     def by_ray(self) -> Totals:
         """One camera ray after the other, each with the paths that share it."""
@@ -112,9 +114,9 @@ class Lanes:
             end = dr.minimum((ray + 1) * work.paths, work.stop)
             state: tuple[Any, ...] = (begin, *once)
             sums = dr.while_loop(state, lambda sample, *_: sample < end, add_path)[1:]
-            return ray + work.sharing, *sums
+            return ray + 1, *sums
 
-        return Totals(*self._loop(add_ray, lambda ray, *_: ray * work.paths < work.stop))
+        return Totals(*self._loop(add_ray, lambda ray, *_: ray < self.last))
 
     def by_vertex(self) -> Totals:
         """One vertex after the other: where a path has ended, the next one starts at once.
@@ -122,8 +124,8 @@ class Lanes:
         So no lane waits for the longest path among its neighbours (Novák et al. 2010, "Path
         Regeneration for Interactive Path Tracing"); in turn all vertices share one piece of code.
         """
-        work, tracer, fields = self.work, self.tracer, len(Path._fields)
-        first_sample = work.first_ray
+        tracer, fields = self.tracer, len(Path._fields)
+        first_sample = self.work.first_ray
 
         def add_vertex(sample: UInt32, depth: UInt32, *state: Any) -> tuple[Any, ...]:
             sampler = self._sampler(first_sample + sample)
@@ -139,12 +141,12 @@ class Lanes:
                 dr.select(ends, path.rays, 0),
                 dr.select(ends, self.types.UInt32(1), 0),
             )
-            sample = sample + dr.select(ends, work.sharing, 0)
+            sample = sample + dr.select(ends, self.types.UInt32(1), 0)
             return sample, dr.select(ends, 0, depth + 1), *path, *totals
 
-        any_path = tracer.start(self._camera_ray(self._sampler(self.start)))
+        any_path = tracer.start(self._camera_ray(self._sampler(self.first)))
         zero = dr.zeros(self.types.UInt32, self.count)
-        sums = self._loop(add_vertex, lambda sample, *_: sample < work.stop, zero, *any_path)
+        sums = self._loop(add_vertex, lambda sample, *_: sample < self.last, zero, *any_path)
         return Totals(*sums[-3:])
 
     def _loop(
@@ -154,7 +156,7 @@ class Lanes:
             dr.zeros(t, self.count)
             for t in (self.types.Array3f64, self.types.UInt32, self.types.UInt32)
         )
-        start: tuple[Any, ...] = (self.start, *state, *zeros)
+        start: tuple[Any, ...] = (self.first, *state, *zeros)
         return dr.while_loop(start, goes_on, body)[1:]
 
     def _sampler(self, index: UInt32) -> Sampler:

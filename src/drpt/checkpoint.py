@@ -1,0 +1,116 @@
+"""The state of a render on disk, so that a killed one goes on where it was.
+
+A file holds a line that names the format, the SHA-256 of all that follows, and a NumPy archive of
+numbers (as JSON) and arrays. It appears whole under its name, or the one before stays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drpt.output import replacing
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import BinaryIO
+
+    from numpy.typing import NDArray
+
+    Facts = Mapping[str, str | int | float | bool | list[int] | list[float] | None]
+    Arrays = Mapping[str, NDArray[Any]]
+
+MAGIC = b"drpt checkpoint 1\n"
+BODY = len(MAGIC) + hashlib.sha256().digest_size
+
+
+class CheckpointError(ValueError):
+    """A file is no checkpoint, is damaged, or belongs to another render."""
+
+
+class Checkpoint:
+    """Where the state of a render is kept.
+
+    Parameters
+    ----------
+    path
+        The file.
+    identity
+        What the render is; a state of one that differs anywhere is refused.
+    interval
+        Seconds between two states.
+    """
+
+    def __init__(self, path: Path, identity: Facts, interval: float) -> None:
+        self.path = path
+        self._identity = dict(identity)
+        self._interval = interval
+        self._last = monotonic()
+
+    def load(self) -> tuple[dict[str, Any], Arrays] | None:
+        """Facts and arrays that were saved last; None if there is no file.
+
+        Raises `CheckpointError` for what is no checkpoint of this render, and `OSError`.
+        """
+        if not self.path.exists():
+            return None
+        state, arrays = _read(self.path)
+        _compare(self.path, state["identity"], self._identity)
+        return state["facts"], arrays
+
+    def is_due(self) -> bool:
+        """Whether it is time to save again."""
+        return monotonic() - self._last >= self._interval
+
+    def save(self, facts: Facts, arrays: Arrays) -> None:
+        """Replace what was saved before; raises `OSError` where that fails."""
+        text = json.dumps({"identity": self._identity, "facts": facts})
+        with replacing(self.path, token=self.path.name) as stream:
+            stream.write(MAGIC.ljust(BODY, b"\0"))
+            np.savez(stream, allow_pickle=False, state=np.array(text), **arrays)
+            digest = _digest(stream)
+            stream.seek(len(MAGIC))
+            stream.write(digest)
+        self._last = monotonic()
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    with open(path, "rb") as stream:
+        if stream.read(len(MAGIC)) != MAGIC:
+            raise CheckpointError(f"{path}: this is no checkpoint of this version of drpt")
+        if stream.read(BODY - len(MAGIC)) != _digest(stream):
+            raise CheckpointError(f"{path}: it is damaged: its checksum is not that of its content")
+        stream.seek(BODY)
+        try:
+            with np.load(stream, allow_pickle=False) as archive:
+                arrays = dict(archive)
+                return json.loads(str(arrays.pop("state"))), arrays
+        except (KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise CheckpointError(f"{path}: its content cannot be read ({error})") from error
+
+
+def _digest(stream: BinaryIO) -> bytes:
+    stream.seek(BODY)
+    return hashlib.file_digest(stream, "sha256").digest()  # type: ignore[arg-type]
+
+
+def _compare(path: Path, there: Facts, here: Facts) -> None:
+    """Refuse the state of another render, and say what is different."""
+    for name in here:
+        if there.get(name) != here[name]:
+            old, new = _difference(str(there.get(name)), str(here[name]))
+            raise CheckpointError(
+                f"{path}: it belongs to another render: {name} is {old} there and {new} here"
+            )
+
+
+def _difference(there: str, here: str) -> tuple[str, str]:
+    """The first lines that differ."""
+    pairs = zip(there.splitlines(), here.splitlines(), strict=False)
+    return next(((old, new) for old, new in pairs if old != new), (there[-40:], here[-40:]))

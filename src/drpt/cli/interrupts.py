@@ -1,0 +1,57 @@
+"""Ctrl-C and SIGTERM: the first asks for an end, the second is one."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from drpt.cli.status import say
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Request:
+    """A signal that has asked for an end, or None yet."""
+
+    def __init__(self) -> None:
+        self.signal: signal.Signals | None = None
+
+    @property
+    def status(self) -> int:
+        """Exit status by which a shell knows the signal; 0 without one."""
+        return 0 if self.signal is None else 128 + self.signal
+
+
+@contextmanager
+def interrupts_noted() -> Iterator[Request]:
+    """Note the first signal, and say so; leave the program at the second.
+
+    Signals that were ignored stay so, as Ctrl-C is in what a script runs in the background.
+    """
+    request = Request()
+
+    def note(number: int, _: FrameType | None) -> None:
+        if request.signal is None:
+            request.signal = signal.Signals(number)
+            with suppress(OSError):  # Ctrl-C in a pipe has ended the reader, too
+                say("stopping after this pass; once more stops at once")
+        elif number == signal.SIGINT:
+            sys.exit(request.status)
+        else:
+            signal.raise_signal(signal.SIGINT)  # which waits for Dr.Jit
+
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    heeded = [number for number in SIGNALS if before[number] != signal.SIG_IGN]
+    for number in heeded:
+        signal.signal(number, note)
+    try:
+        yield request
+    finally:
+        for number in heeded:
+            signal.signal(number, before[number])

@@ -1,0 +1,42 @@
+"""Exit statuses, and how errors become one line and one of them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterator
+
+FAILED = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
+TERMINATED = 143
+
+STATUSES = f"0; {FAILED} if the run failed; {BAD_INPUT} for bad input; {INTERRUPTED} after Ctrl-C"
+"""For the help of a subcommand to which nothing else applies."""
+
+
+@contextmanager
+def bad_input(parser: argparse.ArgumentParser) -> Iterator[None]:
+    """Turn what is wrong with the input into the parser's error."""
+    try:
+        yield
+    except OSError as error:
+        named = error.filename and error.strerror
+        parser.error(f"{error.filename}: {error.strerror}" if named else str(error))
+    except (ValueError, ImportError) as error:
+        parser.error(str(error))
+
+
+def say(line: str) -> None:
+    """Print a line to stderr."""
+    print(*line.splitlines(), file=sys.stderr)
+
+
+def drop_stdout() -> None:
+    """Send what is left in stdout nowhere: its reader has gone, and Python would complain."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

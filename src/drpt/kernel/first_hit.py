@@ -1,0 +1,164 @@
+"""First hits: what the camera sees at once, as layers that denoisers and viewers take.
+
+The launches that trace paths trace camera rays alone here, which bring home a feature of what they
+meet in place of its light.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import drjit as dr
+import numpy as np
+
+from drpt.kernel.backend import interrupts_put_off
+from drpt.kernel.brdf import make_brdf
+from drpt.kernel.camera import make_camera
+from drpt.kernel.estimator import Features, Mode
+from drpt.kernel.intersect import closest_hit
+from drpt.kernel.launch import Launcher, prepare
+from drpt.kernel.path import Tracer, Vertex
+from drpt.kernel.sampler import SAMPLERS
+from drpt.kernel.vec import vec3
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from drjit.auto import Array3f
+    from numpy.typing import NDArray
+
+    from drpt.kernel.brdf import Brdf
+    from drpt.kernel.camera import Ray
+    from drpt.kernel.intersect import Hit
+    from drpt.kernel.primitives import Primitives
+    from drpt.kernel.sampler import Sampler
+    from drpt.scene import Camera, Scene
+
+LAUNCH_PIXELS = 2**20
+"""Pixels of a launch at the most, which bounds its memory to some 100 MB."""
+LAUNCH_SAMPLES = 2**4
+"""Samples of a launch, of each pixel, at the most: an interrupt waits for its end."""
+
+
+def first_hits(
+    types: ModuleType,
+    scene: Scene,
+    spp: int,
+    *,
+    sampler: str = "sobol",
+    seed: int = 0,
+    jitter: bool = True,
+) -> dict[str, NDArray[np.float32]]:
+    """Average what camera rays meet first, on the backend ``types``.
+
+    Sample number k of a pixel goes through the same point as camera ray number k of a render with
+    the same sampler, seed and jitter; the pixel filter is the same box.
+
+    Returns
+    -------
+    dict
+        Layers of float32, row 0 at the top:
+
+        - ``albedo`` (height, width, 3), from 0 to 1: that of the surface. The front of a light
+          counts as white; its back, and the background, as black.
+        - ``normal`` (height, width, 3): the shading normal in world space, on the side of the
+          camera; 0 for the background. A mean of unit vectors is shorter where they differ.
+        - ``depth`` (height, width): how far ahead of the eye, along the camera's axis. That is z
+          in camera space, as compositors and Blender's channel ``Depth.Z`` have it; Mitsuba's
+          depth, ``T``, is the distance from the eye instead. The mean of the samples that meet
+          something; infinite where none does.
+    """
+    with interrupts_put_off():
+        primitives, on_device = prepare(scene.shapes, types)
+        camera = make_camera(scene.camera, primitives.origin, on_device.types)
+        estimator = on_device, _features(primitives), Mode.IMPLICIT, 0
+        forward = _axis(scene.camera, on_device.types)
+
+    def mean(tracer: Tracer) -> NDArray[np.float64]:
+        launcher = Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray=1)
+        return _mean(launcher, scene.camera, spp, seed)
+
+    far, share, _ = np.moveaxis(mean(_DepthTracer(*estimator, forward)), -1, 0)
+    layers = {
+        "albedo": mean(_AlbedoTracer(*estimator)),
+        "normal": mean(_NormalTracer(*estimator)),
+        "depth": np.divide(far, share, out=np.full_like(far, np.inf), where=share > 0),
+    }
+    return {name: layer.astype(np.float32) for name, layer in layers.items()}
+
+
+def _features(primitives: Primitives) -> Features:
+    """What first hits need: all surfaces, whether there is light on them or not."""
+    return replace(
+        Features.of(primitives, 0, Mode.IMPLICIT),
+        emission=True,
+        spheres=len(primitives.spheres) > 0,
+        triangles=len(primitives.planes) > 0,
+        interpolated_normals=len(primitives.smooth_corners) > 0,
+        diffuse=len(primitives.reflectance) > 0,
+    )
+
+
+def _axis(camera: Camera, types: ModuleType) -> Array3f:
+    """The unit vector along which a camera looks, an input of the kernel."""
+    view = np.subtract(camera.target, camera.eye)
+    return types.Array3f(*(dr.opaque(types.Float32, x) for x in view / np.linalg.norm(view)))
+
+
+def _mean(launcher: Launcher, camera: Camera, spp: int, seed: int) -> NDArray[np.float64]:
+    """Means (height, width, 3) of what the samples of each pixel bring home."""
+    sums = np.zeros((camera.height * camera.width, 3))
+    parts = _split(len(sums), LAUNCH_PIXELS), _split(spp, LAUNCH_SAMPLES)
+    for pixels, samples in product(*parts):
+        with interrupts_put_off():
+            one_run = launcher.launch(pixels, samples, len(samples), seed)
+        sums[pixels.start : pixels.stop] += one_run.radiance[0]
+    return (sums / spp).reshape(camera.height, camera.width, 3)
+
+
+def _split(count: int, size: int) -> list[range]:
+    return [range(start, min(start + size, count)) for start in range(0, count, size)]
+
+
+class _FirstHitTracer(Tracer, ABC):
+    """A tracer of camera rays alone, with a feature of what they meet for the radiance."""
+
+    def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
+        path = self.start(ray)
+        hit = closest_hit(self.scene, self.features, ray, path.active)
+        reflects = hit.valid & (hit.primitive < self.scene.first_light)
+        brdf = make_brdf(self.scene, self.features, hit._replace(valid=reflects), -ray.direction)
+        feature = dr.select(hit.valid, self._feature(ray, hit, brdf), 0)
+        return Vertex(path._replace(radiance=feature), hit, brdf)
+
+    @abstractmethod
+    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+        """The feature of a hit; anything where there is none."""
+
+
+class _AlbedoTracer(_FirstHitTracer):
+    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+        lit = (hit.primitive >= self.scene.first_light) & hit.front
+        return dr.select(lit, 1, brdf.albedo)
+
+
+class _NormalTracer(_FirstHitTracer):
+    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+        """The normal of a light is not of unit length, and 0 where its centre rounds to the hit."""
+        length = dr.norm(hit.shading_normal)
+        return dr.select(length > 0, hit.shading_normal / length, -ray.direction)
+
+
+@dataclass
+class _DepthTracer(_FirstHitTracer):
+    """Depth, and 1 to count the hits."""
+
+    forward: Array3f
+
+    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+        depth = hit.distance * dr.dot(ray.direction, self.forward)
+        one = type(depth)(1)
+        return vec3(depth, one, one)

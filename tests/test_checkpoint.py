@@ -1,0 +1,486 @@
+"""Checkpoints: the same bits after every interruption, or a refusal that says why."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import drpt
+from drpt.checkpoint import BODY, MAGIC, Checkpoint, CheckpointError
+from drpt.kernel.launch import Launcher
+from tests.scenes import BALL, LAMP, LAMP_AND_BALL, scene_of
+
+SETTINGS: dict[str, Any] = {"spp": 100, "bounces": 2, "mode": "mis", "sampler": "sobol", "seed": 3}
+ALWAYS = 1e-9
+"""Seconds between states that are over after each pass."""
+PASSES = 7
+"""Passes of 16 samples and of what is left."""
+RENDER = sys.modules["drpt.render"]
+
+
+@pytest.fixture(autouse=True)
+def _many_passes_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drpt.plan.LAUNCH_PATHS", 96 * 16)
+    monkeypatch.setattr("drpt.plan.LAUNCH_PIXELS", 40)
+    monkeypatch.setattr("drpt.plan.LAUNCH_LANES", 40)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "state.drpt"
+
+
+def rendering_of(path: Path | None = None, **change: Any) -> drpt.Rendering:
+    settings = {"scene": LAMP_AND_BALL, **SETTINGS, **change}
+    return drpt.Rendering(checkpoint=path, checkpoint_interval=ALWAYS, **settings)
+
+
+def finish(rendering: drpt.Rendering) -> drpt.Result:
+    for _ in rendering.passes():
+        pass
+    return rendering.result()
+
+
+def run_passes(rendering: drpt.Rendering, count: int) -> None:
+    passes = rendering.passes()
+    for _ in range(count):
+        next(passes)
+    passes.close()
+
+
+def assert_equal(a: drpt.Result, b: drpt.Result) -> None:
+    assert np.array_equal(a.image, b.image, equal_nan=True)
+    assert np.array_equal(a.standard_error, b.standard_error, equal_nan=True)
+    assert (a.spp, a.rays, a.non_finite) == (b.spp, b.rays, b.non_finite)
+    assert (a.first_non_finite, a.warning) == (b.first_non_finite, b.warning)
+    assert np.array_equal(a.error, b.error, equal_nan=True)
+
+
+VARIANTS: list[dict[str, Any]] = [
+    {},
+    {"sampler": "independent"},
+    {"error": False},
+    {"jitter": False, "mode": "implicit"},
+    {"seed": 2**100},
+    {"target_error": 1e-9},
+    {"scene": scene_of(BALL, drpt.Sphere((0, 2, 1), 0.5, radiance=0))},
+]
+
+
+class TestResuming:
+    @pytest.mark.parametrize("variant", VARIANTS)
+    @pytest.mark.parametrize("after", [1, 3, PASSES - 1])
+    def test_it_gives_the_same_bits(self, after: int, variant: dict[str, Any], path: Path) -> None:
+        whole = finish(rendering_of(**variant))
+        run_passes(rendering_of(path, **variant), after)
+        resumed = rendering_of(path, **variant)
+        assert 0 < resumed.spp < 100
+        assert resumed.result().partial
+        found = finish(resumed)
+        assert not found.partial
+        assert_equal(found, whole)
+
+    def test_it_can_happen_after_each_pass(self, path: Path) -> None:
+        for _ in range(PASSES):
+            run_passes(rendering_of(path), 1)
+        assert_equal(rendering_of(path).result(), finish(rendering_of()))
+
+    def test_an_exception_amid_a_pass_leaves_the_passes_before(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        whole, launch, count = finish(rendering_of()), Launcher.launch, 0
+
+        def interrupted(self: Launcher, *arguments: Any) -> Any:
+            nonlocal count
+            count += 1
+            if count == 8:  # the second of three parts of the third pass
+                raise KeyboardInterrupt
+            return launch(self, *arguments)
+
+        monkeypatch.setattr(Launcher, "launch", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            finish(rendering_of(path))
+        resumed = rendering_of(path)
+        assert resumed.spp == 32
+        assert_equal(finish(resumed), whole)
+
+    def test_the_interrupted_rendering_itself_can_go_on(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        whole, launch, count = finish(rendering_of()), Launcher.launch, 0
+
+        def interrupted(self: Launcher, *arguments: Any) -> Any:
+            nonlocal count
+            count += 1
+            if count in (2, 9):
+                raise KeyboardInterrupt
+            return launch(self, *arguments)
+
+        monkeypatch.setattr(Launcher, "launch", interrupted)
+        rendering = rendering_of(path)
+        for _ in range(2):
+            with pytest.raises(KeyboardInterrupt):
+                finish(rendering)
+        assert_equal(finish(rendering), whole)
+        assert_equal(rendering_of(path).result(), whole)
+
+    def test_a_finished_render_is_there_at_once(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        whole = finish(rendering_of(path))
+        monkeypatch.setattr(Launcher, "launch", None)
+        assert_equal(finish(rendering_of(path)), whole)
+        again = drpt.render(LAMP_AND_BALL, checkpoint=path, **SETTINGS)
+        assert_equal(again, whole)
+
+    def test_a_render_that_stopped_early_stays_so(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        change: dict[str, Any] = {"spp": 2**16, "target_error": 1e-3}
+        stopped = finish(rendering_of(path, **change))
+        assert 64 <= stopped.spp < 2**16
+        monkeypatch.setattr(Launcher, "launch", None)
+        again = finish(rendering_of(path, **change))
+        assert_equal(again, stopped)
+        assert not again.partial
+
+    def test_it_stops_where_an_uninterrupted_one_does(self, path: Path) -> None:
+        change: dict[str, Any] = {"spp": 2**16, "target_error": 1e-3}
+        whole = finish(rendering_of(**change))
+        for after in (1, 2, 1):
+            run_passes(rendering_of(path, **change), after)
+        assert_equal(finish(rendering_of(path, **change)), whole)
+
+    @pytest.mark.filterwarnings("ignore:.*samples were not finite")
+    def test_what_was_not_finite_is_remembered(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from drpt.kernel.path import Tracer
+
+        follow = Tracer.follow
+
+        def broken(self: Tracer, first: Any, sampler: Any) -> Any:
+            import drjit as dr
+
+            radiance, rays = follow(self, first, sampler)
+            bad = (sampler.pixel == 31) & (sampler.index == 10)
+            return radiance + dr.select(bad, float("nan"), 0), rays
+
+        monkeypatch.setattr(Tracer, "follow", broken)
+        whole = finish(rendering_of(sampler="independent"))
+        assert whole.first_non_finite == (7, 2, 10)
+        run_passes(rendering_of(path, sampler="independent"), 2)
+        assert_equal(finish(rendering_of(path, sampler="independent")), whole)
+
+    def test_seconds_add_up(self, path: Path) -> None:
+        run_passes(rendering_of(path), 3)
+        before = rendering_of(path).result().seconds
+        assert finish(rendering_of(path)).seconds > before > 0
+
+    def test_render_takes_a_checkpoint(self, path: Path) -> None:
+        run_passes(rendering_of(path), 3)
+        resumed = drpt.render(LAMP_AND_BALL, checkpoint=str(path), **SETTINGS)
+        assert_equal(resumed, finish(rendering_of()))
+
+
+class TestWhenItIsSaved:
+    def test_there_is_one_in_the_end_whatever_the_interval(self, path: Path) -> None:
+        rendering = drpt.Rendering(
+            LAMP_AND_BALL, checkpoint=path, checkpoint_interval=1e9, **SETTINGS
+        )
+        passes = rendering.passes()
+        next(passes)
+        assert not path.exists()
+        passes.close()
+        assert rendering_of(path).spp == 16
+
+    def test_the_interval_is_heeded(self, path: Path) -> None:
+        passes = rendering_of(path).passes()
+        for done in range(16, 100, 16):
+            assert next(passes) == done
+            assert rendering_of(path).spp == done
+
+    def test_it_takes_the_place_of_the_one_before_and_leaves_no_other_file(
+        self, path: Path
+    ) -> None:
+        finish(rendering_of(path))
+        assert list(path.parent.iterdir()) == [path]
+
+    @pytest.mark.parametrize("value", [0, -1, "30", None, float("nan")])
+    def test_a_bad_interval_is_refused(self, value: Any, path: Path) -> None:
+        with pytest.raises(ValueError, match=r"^checkpoint_interval: .* a number > 0$"):
+            drpt.Rendering(LAMP_AND_BALL, checkpoint=path, checkpoint_interval=value)
+
+
+OTHER: list[tuple[dict[str, Any], str]] = [
+    ({"spp": 101}, "spp is 100 there and 101 here"),
+    ({"bounces": 1}, "bounces is 2 there and 1 here"),
+    ({"mode": "explicit"}, "mode is mis there and explicit here"),
+    ({"sampler": "independent"}, "sampler is sobol there and independent here"),
+    ({"seed": 4}, "seed is 3 there and 4 here"),
+    ({"jitter": False}, "jitter is True there and False here"),
+    ({"error": False}, "error is True there and False here"),
+    ({"scene": scene_of(BALL, LAMP, height=9)}, "scene is height = 8 there and height = 9 here"),
+    (
+        {"scene": scene_of(replace(BALL, radius=1 + 2**-50), LAMP)},
+        "scene is radius = 1.0 there and radius = 1.000000000000000",
+    ),
+    ({"scene": scene_of(LAMP)}, "scene is "),
+]
+
+
+class TestAnotherRender:
+    @pytest.mark.parametrize(("change", "difference"), OTHER)
+    def test_it_is_refused_with_the_difference(
+        self, change: dict[str, Any], difference: str, path: Path
+    ) -> None:
+        run_passes(rendering_of(path), 2)
+        before = path.read_bytes()
+        with pytest.raises(CheckpointError, match="it belongs to another render: ") as error:
+            rendering_of(path, **change)
+        assert str(error.value).startswith(f"{path}: ")
+        assert difference in str(error.value)
+        assert "\n" not in str(error.value)
+        assert path.read_bytes() == before
+
+    @pytest.mark.parametrize("name", ["drpt", "drjit"])
+    def test_another_version_is_refused(
+        self, name: str, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        run_passes(rendering_of(path), 1)
+        real = RENDER.version
+        monkeypatch.setattr(RENDER, "version", lambda n: "99.0" if n == name else real(n))
+        with pytest.raises(CheckpointError, match=rf"version of {name} is .* there and 99\.0 here"):
+            rendering_of(path)
+
+    def test_another_backend_is_refused(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        from drpt.kernel import backend
+
+        run_passes(rendering_of(path), 1)
+        wide = replace(backend.describe(), vector_width=3)
+        monkeypatch.setattr(backend, "describe", lambda: wide)
+        with pytest.raises(CheckpointError, match=r"backend is .* lanes there and .* 3 lanes here"):
+            rendering_of(path)
+
+    @pytest.mark.parametrize("sizes", [2, 40])
+    def test_another_vertex_is_refused(self, sizes: int, path: Path) -> None:
+        """Of a small mesh, which is spelt out, and of a large one, of which there is a checksum."""
+
+        def scene(height: float) -> drpt.Scene:
+            x, y = np.mgrid[:sizes, :sizes].reshape(2, -1).astype(float)
+            z = np.zeros_like(x)
+            z[-1] = height
+            corner = np.arange(sizes * sizes).reshape(sizes, sizes)
+            faces = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:]], axis=-1)
+            mesh = drpt.Mesh(np.stack([x, y, z], 1), faces.reshape(-1, 3), material=BALL.material)
+            return scene_of(mesh, LAMP)
+
+        run_passes(rendering_of(path, scene=scene(0.0)), 1)
+        with pytest.raises(CheckpointError, match="another render: scene is "):
+            rendering_of(path, scene=scene(1e-9))
+
+    def test_threads_are_no_difference(self, path: Path) -> None:
+        from drpt.kernel import backend
+
+        whole = finish(rendering_of())
+        run_passes(rendering_of(path), 3)
+        threads = backend.describe().threads
+        backend.set_thread_count(1)
+        try:
+            assert_equal(finish(rendering_of(path)), whole)
+        finally:
+            backend.set_thread_count(threads)
+
+
+class TestDamage:
+    @pytest.fixture
+    def saved(self, path: Path) -> bytes:
+        run_passes(rendering_of(path), 2)
+        return path.read_bytes()
+
+    def refuse(self, content: bytes, path: Path) -> str:
+        path.write_bytes(content)
+        checkpoint = Checkpoint(path, {}, 1)
+        with pytest.raises(CheckpointError) as error:
+            checkpoint.load()
+        assert path.read_bytes() == content
+        assert str(error.value).startswith(f"{path}: ")
+        return str(error.value)
+
+    def test_a_flipped_bit_is_seen_wherever_it_is(self, saved: bytes, path: Path) -> None:
+        places = {*range(BODY + 100), *range(BODY, len(saved), 37), len(saved) - 1}
+        for place in sorted(places):
+            damaged = bytearray(saved)
+            damaged[place] ^= 1 << (place % 8)
+            message = self.refuse(bytes(damaged), path)
+            expected = "is no checkpoint" if place < len(MAGIC) else "is damaged"
+            assert expected in message
+
+    def test_a_missing_end_is_seen(self, saved: bytes, path: Path) -> None:
+        for length in {*range(BODY + 100), *range(BODY, len(saved), 37), len(saved) - 1}:
+            self.refuse(saved[:length], path)
+
+    def test_what_follows_is_seen(self, saved: bytes, path: Path) -> None:
+        assert "is damaged" in self.refuse(saved + b"\0", path)
+
+    @pytest.mark.parametrize("content", [b"", b"PK\3\4", b"\x89PNG\r\n\x1a\n" + bytes(100)])
+    def test_other_files_are_refused(self, content: bytes, path: Path) -> None:
+        assert "this is no checkpoint" in self.refuse(content, path)
+
+    def test_a_render_refuses_it_and_leaves_it(self, saved: bytes, path: Path) -> None:
+        path.write_bytes(saved[:-1])
+        with pytest.raises(CheckpointError, match="it is damaged"):
+            drpt.render(LAMP_AND_BALL, checkpoint=path, **SETTINGS)
+        assert path.read_bytes() == saved[:-1]
+
+    def test_an_array_of_objects_is_not_unpickled(self, path: Path) -> None:
+        import hashlib
+        import io
+
+        class Bomb:
+            def __reduce__(self) -> Any:
+                return (os.mkdir, (str(path.parent / "exploded"),))
+
+        body = io.BytesIO()
+        np.savez(body, state=np.array([Bomb()], dtype=object))
+        content = MAGIC + hashlib.sha256(body.getvalue()).digest() + body.getvalue()
+        assert "cannot be read" in self.refuse(content, path)
+        assert not (path.parent / "exploded").exists()
+
+    def test_it_holds_no_pickle(self, saved: bytes, path: Path) -> None:
+        with open(path, "rb") as stream:
+            stream.seek(BODY)
+            with np.load(stream, allow_pickle=False) as archive:
+                assert {"state", "total", "blocks"} <= set(archive)
+                assert all(array.dtype.kind in "fU" for array in archive.values())
+
+
+class TestPlaces:
+    def test_a_missing_folder_is_found_before_the_render(self, tmp_path: Path) -> None:
+        with pytest.raises(FileNotFoundError, match=r"state\.drpt: the folder .* does not exist"):
+            rendering_of(tmp_path / "nowhere" / "state.drpt")
+
+    def test_a_folder_is_no_checkpoint(self, tmp_path: Path) -> None:
+        with pytest.raises(IsADirectoryError, match="this is a folder"):
+            rendering_of(tmp_path)
+
+    def test_a_folder_that_vanishes_is_warned_about_and_the_render_goes_on(
+        self, tmp_path: Path
+    ) -> None:
+        folder = tmp_path / "folder"
+        folder.mkdir()
+        rendering = rendering_of(folder / "state.drpt")
+        passes = rendering.passes()
+        next(passes)
+        shutil.rmtree(folder)
+        with pytest.warns(RuntimeWarning, match=r"^no checkpoint: .*state\.drpt: it could not be"):
+            for _ in passes:
+                pass
+        assert_equal(rendering.result(), finish(rendering_of()))
+        assert not folder.exists()
+
+    def test_a_folder_that_comes_back_is_used_again(self, tmp_path: Path) -> None:
+        folder = tmp_path / "folder"
+        folder.mkdir()
+        passes = rendering_of(folder / "state.drpt").passes()
+        next(passes)
+        shutil.rmtree(folder)
+        with pytest.warns(RuntimeWarning, match="no checkpoint"):
+            next(passes)
+        folder.mkdir()
+        next(passes)
+        assert rendering_of(folder / "state.drpt").spp == 48
+
+    def test_a_full_disk_is_warned_about_and_leaves_the_state_before(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        passes = rendering_of(path).passes()
+        next(passes)
+        before = path.read_bytes()
+
+        def full(*_: Any) -> None:
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("os.fsync", full)
+        with pytest.warns(RuntimeWarning, match="could not be written .No space left on device"):
+            next(passes)
+        assert path.read_bytes() == before
+        assert list(path.parent.iterdir()) == [path]
+        monkeypatch.undo()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            passes.close()
+
+    def test_without_one_nothing_is_written(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        finish(rendering_of())
+        assert list(tmp_path.iterdir()) == []
+
+
+KILLS = 20
+CHILD = """
+import sys
+import numpy as np
+import drpt
+import drpt.plan
+drpt.plan.LAUNCH_PATHS = 96 * 16
+drpt.plan.LAUNCH_PIXELS = 50
+drpt.plan.LAUNCH_LANES = 40
+from tests.scenes import LAMP_AND_BALL
+path = sys.argv[1] if len(sys.argv) > 1 else None
+rendering = drpt.Rendering(
+    LAMP_AND_BALL, {spp}, 2, seed=7, checkpoint=path, checkpoint_interval=1e-6
+)
+print(rendering.spp, flush=True)
+for _ in rendering.passes():
+    pass
+result = rendering.result()
+facts = result.image.tobytes(), result.standard_error.tobytes()
+print(hash(facts), result.spp, result.rays, result.non_finite)
+"""
+
+
+def start_child(spp: int, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", CHILD.format(spp=spp), *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONHASHSEED": "0"},
+        cwd=Path(__file__).parents[1],
+    )
+
+
+@pytest.mark.slow
+def test_a_render_killed_twenty_times_has_the_bits_of_one_that_was_not(path: Path) -> None:
+    """Of 512 passes, in two launches each, some run between two kills; or none."""
+    spp, chance = 2**13, random.Random(1)
+    with start_child(spp) as child:
+        expected = child.communicate()[0].splitlines()[-1]
+    resumed = [0]
+    while len(resumed) <= KILLS:
+        with start_child(spp, str(path)) as child:
+            assert child.stdout is not None
+            resumed.append(int(child.stdout.readline()))
+            time.sleep(chance.uniform(0.3, 0.75))
+            child.kill()
+        assert child.returncode == -signal.SIGKILL
+    assert resumed == sorted(resumed)
+    assert len(set(resumed)) > KILLS // 2  # most of them came further than the one before
+    with start_child(spp, str(path)) as child:
+        found = child.communicate()[0].splitlines()
+    assert int(found[0]) >= resumed[-1]
+    assert found[-1] == expected
