@@ -10,7 +10,7 @@ import pytest
 
 import drpt
 from drpt.error import DARK
-from drpt.stopping import FASTEST, LEAST_SPP, Stopping
+from drpt.stopping import LEAST_SPP, Stopping
 from tests.scenes import LAMP_AND_BALL, seen_by
 
 # A mean of 400 stopped renders is unbiased if it is within so many standard errors.

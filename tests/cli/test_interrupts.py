@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -101,10 +102,11 @@ class TestInterruptsNoted:
 
 
 def test_sigterm_ends_a_program_with_a_picture() -> None:
-    process = _started(*FOREVER, "--checkpoint", "a.drpt", "--checkpoint-interval", "1e-9")
-    _wait_for(Path("a.drpt"))
-    process.send_signal(signal.SIGTERM)
-    printed, complaint = process.communicate(timeout=PATIENCE)
+    flags = ["--checkpoint", "a.drpt", "--checkpoint-interval", "1e-9"]
+    with _started(*FOREVER, *flags) as process:
+        _wait_for(Path("a.drpt"), process)
+        process.send_signal(signal.SIGTERM)
+        printed, complaint = process.communicate(timeout=PATIENCE)
     assert process.returncode == 143
     assert complaint == "stopping after this pass; once more stops at once\n"
     assert " spp (partial)  3 bounces" in printed
@@ -123,8 +125,9 @@ def test_a_render_after_ctrl_c_has_the_bits_of_one_without() -> None:
         [*on_terminal, *RENDER, *flags, "--checkpoint-interval", "1e-9"],
         stdout=subprocess.DEVNULL,
         start_new_session=True,
+        text=True,
     )
-    _wait_for(Path("a.drpt"))
+    _wait_for(Path("a.drpt"), process)
     os.write(terminal, b"\x03")
     assert process.wait(PATIENCE) == 130
     os.close(its)
@@ -144,14 +147,14 @@ def test_signals_at_any_moment_leave_nothing_half_done() -> None:
     chance = random.Random(0)
     for _ in range(ROUNDS):
         flags = ["--explain", "--width", "400", "--height", "300", "--layers"]
-        process = _started(*FOREVER, *flags, "-o", "a.exr", "-o", "b.png")
-        assert process.stdout is not None
-        process.stdout.readline()  # the command has begun; Python itself knows no such care
-        time.sleep(chance.uniform(0, 0.6))
-        process.send_signal(chance.choice(SIGNALS))
-        time.sleep(chance.uniform(0, 0.4))
-        process.send_signal(signal.SIGTERM)
-        _, complaint = process.communicate(timeout=PATIENCE)
+        with _started(*FOREVER, *flags, "-o", "a.exr", "-o", "b.png") as process:
+            assert process.stdout is not None
+            process.stdout.readline()  # the command has begun; Python itself knows no such care
+            time.sleep(chance.uniform(0, 0.6))
+            process.send_signal(chance.choice(SIGNALS))
+            time.sleep(chance.uniform(0, 0.4))
+            process.send_signal(signal.SIGTERM)
+            _, complaint = process.communicate(timeout=PATIENCE)
         # Before and after what the command takes care of, the system ends it.
         assert process.returncode in (130, 143, -signal.SIGTERM)
         assert "Traceback" not in complaint
@@ -161,14 +164,19 @@ def test_signals_at_any_moment_leave_nothing_half_done() -> None:
             Path("a.exr").unlink()
 
 
-def _started(*flags: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [*RENDER, *flags], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+@contextmanager
+def _started(*flags: str) -> Iterator[subprocess.Popen[str]]:
+    pipe = subprocess.PIPE
+    with subprocess.Popen([*RENDER, *flags], stdout=pipe, stderr=pipe, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
-def _wait_for(path: Path) -> None:
+def _wait_for(path: Path, process: subprocess.Popen[str]) -> None:
     start = time.monotonic()
     while not path.exists():
+        assert process.poll() is None
         assert time.monotonic() - start < PATIENCE
         time.sleep(0.01)

@@ -9,7 +9,18 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from drpt.cli import check, compare, completion, convert, doctor, explain, merge, render, scenes
+from drpt.cli import (
+    check,
+    compare,
+    completion,
+    convert,
+    doctor,
+    explain,
+    gallery,
+    merge,
+    render,
+    scenes,
+)
 from drpt.cli.parser import Parser, add_version
 from drpt.cli.status import FAILED, INTERRUPTED, drop_stdout, say
 from drpt.kernel import backend
@@ -18,7 +29,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
-COMMANDS = (render, compare, merge, convert, check, scenes, explain, doctor, completion)
+COMMANDS = (render, compare, merge, convert, gallery, check, scenes, explain, doctor, completion)
 """In the order in which ``drpt --help`` lists them."""
 
 

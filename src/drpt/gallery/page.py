@@ -1,0 +1,126 @@
+"""The page: one HTML file that stands beside its pictures and asks no network for anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING
+
+from drpt.gallery import markup
+from drpt.gallery.answers import Table
+from drpt.gallery.charts import log_log
+from drpt.gallery.rendering import REFERENCE_SPP
+from drpt.render import Mode
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from drpt.gallery.answers import Answer
+    from drpt.gallery.figures import Curve, Figure, Plan, Setting
+    from drpt.gallery.rendering import Darkroom, Picture
+
+NUMPY_PATHS_PER_SECOND = 0.034e6
+"""Of a float64 path tracer in NumPy, one sample of all pixels a pass, in the diffuse box with 2
+bounces, on two cores of a Zen 4. Source: docs/performance.md."""
+COURSE_MODES = (Mode.IMPLICIT, Mode.EXPLICIT)
+"""With one sampler, these are the course's own pictures."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """All that stands on the page.
+
+    Attributes
+    ----------
+    answers
+        Those that there are so far.
+    seconds, cpu_seconds
+        What all of it has taken: by the clock, and by the processors together.
+    complete
+        Whether everything of the plan is there.
+    """
+
+    plan: Plan
+    darkroom: Darkroom
+    answers: Sequence[Answer]
+    seconds: float
+    cpu_seconds: float
+    complete: bool
+
+    def html(self) -> str:
+        """Return the page."""
+        bodies = {
+            **{figure.title: self._figure(figure) for figure in self.plan.figures},
+            **{f"Error against time: {c.title}": self._curve(c) for c in self.plan.curves},
+            **{answer.question: markup.answer(answer) for answer in self.answers},
+        }
+        sections = [
+            (number, *item) for number, item in enumerate(bodies.items(), start=1) if item[1]
+        ]
+        return _template("page.html").substitute(
+            style=_template("style.css").template,
+            size=self.plan.size,
+            lead="\n".join(map(markup.paragraph, self._lead())),
+            contents="\n".join(markup.link(number, title) for number, title, _ in sections),
+            sections="\n".join(markup.section(*section) for section in sections),
+            reference_spp=REFERENCE_SPP,
+            version=version("drpt"),
+        )
+
+    def _lead(self) -> list[str]:
+        """What it took, and what the course's own way takes."""
+        darkroom, shown = self.darkroom, {s for f in self.plan.figures for s in f.settings}
+        course = [s for s in shown if s.sampler == "sobol" and s.mode in COURSE_MODES]
+        there = f"{len(darkroom.pictures)} of {len(self.plan.settings)} pictures"
+        return [
+            *([] if self.complete else [f"This page is not complete: it has {there}."]),
+            f"{len(darkroom.pictures)} pictures, {len(darkroom.references)} references and the "
+            f"measurements below, {darkroom.paths / 1e9:.2f} billion paths, took "
+            f"{self.seconds:.0f} s, compilation included, and {self.cpu_seconds:.0f} s of "
+            "processor time.",
+            "In NumPy, one sample of all pixels at a time, the course's own "
+            f"{len(course)} pictures take {self._numpy_hours(course):.1f} hours and all of these "
+            f"{self._numpy_hours(self.plan.settings):.1f}, even if glossy walls and further "
+            f"bounces cost nothing: it traces {NUMPY_PATHS_PER_SECOND / 1e6:g} million paths per "
+            "second in the diffuse box with 2 bounces (on two cores of a Zen 4).",
+        ]
+
+    def _numpy_hours(self, settings: Sequence[Setting]) -> float:
+        paths = self.plan.size**2 * sum(setting.spp for setting in settings)
+        return paths / NUMPY_PATHS_PER_SECOND / 3600
+
+    def _figure(self, figure: Figure) -> str:
+        pictures = self.darkroom.pictures
+        rows = {
+            row.label: [
+                markup.card(pictures[s], figure.crops) for s in row.settings if s in pictures
+            ]
+            for row in figure.rows
+        }
+        shown = [markup.row(label, cards) for label, cards in rows.items() if cards]
+        return "".join((markup.paragraph(figure.text), "\n", *shown)) if shown else ""
+
+    def _curve(self, curve: Curve) -> str:
+        """A chart of what is measured of a scene, and its numbers."""
+        title = f"relMSE against seconds, {curve.bounces} bounces"
+        measured: dict[str, list[Picture]] = {}
+        for picture in sorted(self.darkroom.pictures.values(), key=lambda p: p.setting.spp):
+            if (picture.setting.scene, picture.setting.bounces) == (curve.scene, curve.bounces):
+                measured.setdefault(picture.setting.way, []).append(picture)
+        if not measured:
+            return ""
+        points = {way: [(p.seconds, p.rel_mse) for p in ladder] for way, ladder in measured.items()}
+        rows = tuple(
+            (way, str(p.setting.spp), f"{p.seconds:.3f}", f"{p.rel_mse:.2g}")
+            for way, ladder in measured.items()
+            for p in ladder
+        )
+        chart = log_log(title, "seconds", "relMSE", dict(sorted(points.items())))
+        table = markup.table(Table(title, ("", "spp", "seconds", "relMSE"), rows))
+        return f"{chart}\n{markup.folded('Numbers', table)}"
+
+
+def _template(name: str) -> Template:
+    return Template((files("drpt.gallery") / "templates" / name).read_text(encoding="utf-8"))
