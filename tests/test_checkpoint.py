@@ -220,7 +220,7 @@ class TestWhenItIsSaved:
 
     @pytest.mark.parametrize("value", [0, -1, "30", None, float("nan")])
     def test_a_bad_interval_is_refused(self, value: Any, path: Path) -> None:
-        with pytest.raises(ValueError, match=r"^checkpoint_interval: .* a number > 0$"):
+        with pytest.raises(ValueError, match=r"^checkpoint_interval: .* a finite number > 0$"):
             drpt.Rendering(LAMP_AND_BALL, checkpoint=path, checkpoint_interval=value)
 
 

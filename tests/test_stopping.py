@@ -74,7 +74,7 @@ BAD: list[dict[str, Any]] = [
 @pytest.mark.parametrize("bad", BAD)
 def test_bad_limits_are_refused_by_name(bad: dict[str, Any]) -> None:
     ((name, value),) = bad.items()
-    with pytest.raises(ValueError, match=rf"^{name}: .*; it must be a number > 0$") as error:
+    with pytest.raises(ValueError, match=rf"^{name}: .*; it must be a finite number > 0$") as error:
         drpt.Rendering(LAMP_AND_BALL, **bad)
     assert repr(value) in str(error.value)
 
@@ -147,3 +147,9 @@ def test_stopping_does_not_bias_the_picture(sampler: str) -> None:
     lit = images.std(axis=0) > 0
     deviations = (images.mean(axis=0) - truth)[lit] / (images.std(axis=0)[lit] / SEEDS**0.5)
     assert np.abs(deviations).mean() < 1  # 0.80 of a normal distribution
+
+
+def test_a_limit_that_is_over_at_once_leaves_one_pass() -> None:
+    result = drpt.render(LAMP_AND_BALL, 2**20, 2, time_limit=1e-9)
+    assert result.spp > 0
+    assert result.image.any()

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from drpt.error import DARK
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -14,9 +16,6 @@ if TYPE_CHECKING:
     from drpt.crosscheck.estimate import Estimate
 
     Image = NDArray[np.floating]
-
-FLOOR = 0.01
-"""Added to squared radiance, so that dark pixels do not count too much."""
 
 
 class Bias(NamedTuple):
@@ -36,12 +35,12 @@ class Reach(NamedTuple):
 def rel_mse(image: Image, reference: Estimate) -> float:
     """Mean of (x − x̂)² / (x̂² + 0.01), less what the noise of the reference adds to it."""
     squares = (image - reference.mean) ** 2 - reference.variance
-    return float((squares / (reference.mean**2 + FLOOR)).mean())
+    return float((squares / (reference.mean**2 + DARK)).mean())
 
 
 def own_rel_mse(estimate: Estimate) -> float:
     """The expected relMSE of an estimate, by its own variance."""
-    return float((estimate.variance / (estimate.mean**2 + FLOOR)).mean())
+    return float((estimate.variance / (estimate.mean**2 + DARK)).mean())
 
 
 def bias(image: Image, reference: Estimate) -> Bias:

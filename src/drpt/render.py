@@ -111,7 +111,9 @@ class Rendering:
         with backend.interrupts_put_off():
             launcher = self.launcher()
         plan = plan_passes(settings.pixels, settings.spp, self.spp, growing=self._stopping.may_come)
-        self._enough = self._stopping.has_come(self.spp, lambda: self.result().error)
+        self._enough = self.spp > 0 and self._stopping.has_come(
+            self.spp, lambda: self.result().error
+        )
         for samples in plan:
             if self._enough:
                 break

@@ -62,12 +62,12 @@ def check_whole(name: str, value: object, low: int, high: int | None) -> int:
 
 
 def check_positive(name: str, value: object) -> float:
-    """Return a number above 0, or raise `ValueError`."""
+    """Return a finite number above 0, or raise `ValueError`."""
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise refuse(name, value, "a number > 0")
+        raise refuse(name, value, "a finite number > 0")
     number = float(value)
     if not 0 < number < np.inf:
-        raise refuse(name, value, "a number > 0")
+        raise refuse(name, value, "a finite number > 0")
     return number
 
 

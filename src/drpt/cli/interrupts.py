@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from drpt.cli.status import say
@@ -39,8 +39,7 @@ def interrupts_noted() -> Iterator[Request]:
     def note(number: int, _: FrameType | None) -> None:
         if request.signal is None:
             request.signal = signal.Signals(number)
-            with suppress(OSError):  # Ctrl-C in a pipe has ended the reader, too
-                say("stopping after this pass; once more stops at once")
+            say("stopping after this pass; once more stops at once")
         elif number == signal.SIGINT:
             sys.exit(request.status)
         else:

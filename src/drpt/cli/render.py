@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Generator, Iterator
 
+    from numpy.typing import NDArray
+
     from drpt.cli.interrupts import Request
     from drpt.cli.parser import Commands
     from drpt.render import Result
@@ -162,8 +164,9 @@ def run(args: argparse.Namespace) -> int:
     if args.explain:
         _print(str(explain(rendering.settings.scene, args.bounces, args.mode)))
     with interrupts_noted() as request, _one_line_warnings(args.parser.prog):
+        first_hits = rendering.first_hits() if args.layers or args.denoise else {}
         _run(rendering, request, preview, progress=_on_terminal() and not args.quiet)
-        result = _finished(rendering, args)
+        result = _finished(rendering.result(), first_hits, args)
         places = [_save(result, path, args) for path in outputs]
     if result.warning:
         say(f"{args.parser.prog}: warning: {result.warning}")
@@ -227,16 +230,13 @@ def _on_terminal() -> bool:
     return sys.stderr is not None and sys.stderr.isatty()  # a service may have closed it
 
 
-def _finished(rendering: Rendering, args: argparse.Namespace) -> Result:
+def _finished(
+    result: Result, first_hits: dict[str, NDArray[np.float32]], args: argparse.Namespace
+) -> Result:
     """The picture, with the layers that are wanted, denoised if that is wanted."""
-    result = rendering.result()
-    if not (args.layers or args.denoise):
-        return result
-    guided = replace(result, layers={**result.layers, **rendering.first_hits()})
-    if not args.denoise:
-        return guided
-    denoised = guided.denoise()
-    return denoised if args.layers else replace(denoised, layers=result.layers)
+    guided = replace(result, layers={**result.layers, **first_hits})
+    finished = guided.denoise() if args.denoise else guided
+    return finished if args.layers else replace(finished, layers=result.layers)
 
 
 def _save(result: Result, path: Path, args: argparse.Namespace) -> Path | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,8 +33,9 @@ def bad_input(parser: argparse.ArgumentParser) -> Iterator[None]:
 
 
 def say(line: str) -> None:
-    """Print a line to stderr."""
-    print(*line.splitlines(), file=sys.stderr)
+    """Print a line to stderr, which may be nobody's any more."""
+    with suppress(OSError):
+        print(*line.splitlines(), file=sys.stderr)
 
 
 def drop_stdout() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from drpt.crosscheck.colours import colour_end, signed_colours
 from drpt.crosscheck.compare import SIGNIFICANCE, sidak
 from drpt.output import write
 
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-PERCENTILE = 99.5
-"""Of the errors that are not 0: where the colours of their picture end."""
 FAILED = (1.0, 0.0, 0.0)
 
 
@@ -35,12 +34,13 @@ def save_maps(comparison: Comparison, folder: str | PathLike[str], prefix: str =
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     image, reference = comparison.image.mean, comparison.reference.mean
+    signed = (image - reference).mean(axis=2)
     test = comparison.of_blocks
     limit = sidak(SIGNIFICANCE, max(test.comparisons, 1))
     maps = {
         "image": (image, image),
         "reference": (reference, reference),
-        "difference": (image - reference, _signed_colours(image - reference)),
+        "difference": (image - reference, signed_colours(signed, colour_end(signed))),
         "p-value": (_grey(test.p_map), _p_colours(test.p_map, limit)),
     }
     paths = []
@@ -49,15 +49,6 @@ def save_maps(comparison: Comparison, folder: str | PathLike[str], prefix: str =
             paths.append(folder / f"{prefix}{name}{suffix}")
             write(paths[-1], values.astype(np.float32), {})
     return paths
-
-
-def _signed_colours(difference: Floats) -> Floats:
-    """White where there is none, red where it is positive, blue where it is negative."""
-    signed = np.nan_to_num(difference.mean(axis=2))
-    sizes = np.abs(signed[signed != 0])
-    share = np.clip(signed / (np.percentile(sizes, PERCENTILE) if sizes.size else 1), -1, 1)
-    less = 1 - np.abs(share)
-    return np.stack([np.where(share > 0, 1, less), less, np.where(share < 0, 1, less)], axis=-1)
 
 
 def _p_colours(p_value: Floats, limit: float) -> Floats:
