@@ -7,21 +7,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
 
-import numpy as np
-
 from benchmarks.bench.metrics import own_rel_mse
 from benchmarks.bench.renderers import drpt
 from benchmarks.bench.scenes import lanterns, resized
 from benchmarks.bench.timing import alternate, median_seconds, start
 from drpt import Mode, Scene, load_scene
 from drpt.crosscheck import measure
+from drpt.kernel import device_scene, light_tree
 from drpt.kernel.launch import prepare
-from drpt.kernel.primitives import Primitives
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from numpy.typing import NDArray
 
     from benchmarks.bench.effort import Effort
 
@@ -31,6 +27,8 @@ FEW, MANY = 10, 10_000
 SPP = 64
 SHORT, LONG = 2, 8
 """Bounces."""
+ALIKE = 1 - 2.0**-20
+"""Even share of a choice that leaves nothing to importance; with all of it nothing is divided."""
 
 
 def measure_all(effort: Effort) -> dict[str, float]:
@@ -55,22 +53,22 @@ def measure_all(effort: Effort) -> dict[str, float]:
 def uniform_choice() -> Iterator[None]:
     """Let drpt choose all lights alike, which it has no setting for.
 
-    The kernels stay the same, and so does their time; what changes is the array of cumulative
-    probabilities. Raises `RuntimeError` where nothing has asked for it.
+    The kernels stay the same, and so does their time; what changes is the even share of each
+    choice. Raises `RuntimeError` where nothing has chosen by it.
     """
+    kept = light_tree.LightTree
+    made: list[light_tree.LightTree] = []
 
-    def even(primitives: Primitives) -> NDArray[np.float64]:
-        asked.append(primitives)
-        count = len(primitives.radiance)
-        return np.round(np.arange(1, count + 1) / count * 2**24) / 2**24
+    def even(*arguments: Any) -> light_tree.LightTree:
+        made.append(kept(*arguments))
+        return made[-1]
 
-    asked: list[Primitives] = []
     prepare.cache_clear()
-    with patch.object(Primitives, "light_cdf", even):
+    with patch.object(light_tree, "EVEN", ALIKE), patch.object(device_scene, "LightTree", even):
         yield
     prepare.cache_clear()
-    if not asked:
-        raise RuntimeError("lights are chosen by something else than Primitives.light_cdf")
+    if not made:
+        raise RuntimeError("lights are chosen by something else than a LightTree")
 
 
 def choice_rel_mse(scene: Scene) -> float:

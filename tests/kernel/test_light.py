@@ -18,6 +18,7 @@ from drpt.kernel.light import (
     power_heuristic,
     sample_light,
 )
+from drpt.kernel.light_tree import Choice
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SobolSampler
 from drpt.kernel.warp import square_to_sphere
@@ -26,7 +27,6 @@ from tests.conftest import TYPES, to_device, to_host, unit_square
 from tests.kernel import polar
 from tests.oracle.arrays import Floats, basis, normalize
 from tests.oracle.closed_forms import sphere_light_irradiance
-from tests.oracle.statistics import chi2_of_counts
 
 SAMPLES = 1_000_000
 SOBOL_SAMPLES = 2**20
@@ -77,7 +77,14 @@ class Lights:
     ) -> LightSample:
         """Sample a light from a point of a surface."""
         at, number = Receiver(to_device([point]), to_device([normal])), TYPES.UInt32([light])
-        return sample_light(self.scene, self.features, self.mode, at, number, u)
+        choice = Choice(number, self.pmf(at, number))
+        return sample_light(self.scene, self.features, self.mode, at, choice, u)
+
+    def pmf(self, at: Receiver, light: Any) -> Any:
+        """Return the probability of a light."""
+        if self.scene.light_tree is None:
+            return TYPES.Float32(1)
+        return self.scene.light_tree.pmf(at, TYPES.Bool(True), light)
 
     def inverse_pdf_of_hits(
         self, direction: Any, light: int = 0, normal: Any = UP
@@ -378,10 +385,10 @@ def test_a_sphere_light_is_dark_from_inside(point: Any, normal: Any) -> None:
     np.testing.assert_array_equal(to_host(sample.inverse_pdf), 0)
 
 
-@pytest.mark.parametrize("light", [SPHERE, TRIANGLE])
-def test_a_receiver_that_is_not_a_number_is_not_dark(light: Shape) -> None:
+@pytest.mark.parametrize("lights", [[SPHERE], [TRIANGLE], [SPHERE, TRIANGLE], 20 * [SPHERE]])
+def test_a_receiver_that_is_not_a_number_is_not_dark(lights: list[Shape]) -> None:
     """Its samples are to be counted, not lost in a comparison that is false."""
-    sample = Lights.of(light).sample(unit_square(10), point=(np.nan, 0, 0))
+    sample = Lights.of(*lights).sample(unit_square(10), point=(np.nan, 0, 0))
     assert np.isnan(to_host(sample.inverse_pdf)).all()
 
 
@@ -445,68 +452,28 @@ MANY: list[Shape] = [
 ]
 
 
-def probabilities(lights: list[Shape]) -> Floats:
-    """Return the probability of each light: half by power, area × luminance, half even."""
-    areas = [
-        4 * pi * light.radius**2 if isinstance(light, Sphere) else light.areas().sum()
-        for light in lights
-    ]
-    radiance = np.array([light.radiance for light in lights], np.float64)
-    power = np.array(areas) * (radiance @ [0.2126, 0.7152, 0.0722])
-    return np.asarray((power / power.sum() + 1 / len(lights)) / 2)
+def test_of_a_single_light_asks_for_no_number() -> None:
+    at = Receiver(to_device([ORIGIN]), to_device([UP]))
 
+    def refuse() -> Any:
+        raise AssertionError
 
-class TestChoice:
-    def test_follows_the_probabilities(self) -> None:
-        p_value = chi2_of_counts(self._counts(MANY), SAMPLES * probabilities(MANY)).p_value
-        assert p_value > SIGNIFICANCE
-
-    def test_chi2_detects_a_bias(self) -> None:
-        expected = probabilities(MANY)
-        expected[np.argsort(expected)[::2]] *= 1 + 4 * BIAS
-        p_value = chi2_of_counts(self._counts(MANY), SAMPLES * expected / expected.sum()).p_value
-        assert p_value < SIGNIFICANCE
-
-    def test_of_a_thousand_lights(self) -> None:
-        rng = np.random.default_rng(8)
-        radiances = 10 ** rng.uniform(-2, 2, 1000)
-        lights: list[Shape] = [
-            Sphere((i % 40, i // 40, 0), 0.3, radiance=L) for i, L in enumerate(radiances)
-        ]
-        p_value = chi2_of_counts(self._counts(lights), SAMPLES * probabilities(lights)).p_value
-        assert p_value > SIGNIFICANCE
-
-    def test_ends_of_the_unit_interval(self) -> None:
-        lights = Lights.of(*MANY)
-        ends = to_device([0, 1 - 2.0**-24])
-        chosen = np.array(choose_light(lights.scene, lights.features, lambda: ends))
-        assert chosen.tolist() == [0, len(MANY) - 1]
-
-    def test_of_a_single_light_asks_for_no_number(self) -> None:
-        lights = Lights.of(SPHERE)
-
-        def refuse() -> Any:
-            raise AssertionError
-
-        assert np.array(choose_light(lights.scene, lights.features, refuse)).tolist() == [0]
-
-    @staticmethod
-    def _counts(shapes: list[Shape]) -> Floats:
-        lights, u = Lights.of(*shapes), unit_square(SAMPLES).x
-        chosen = np.array(choose_light(lights.scene, lights.features, lambda: u))
-        return np.bincount(chosen, minlength=len(shapes)).astype(np.float64)
+    choice = choose_light(Lights.of(SPHERE).scene, at, TYPES.Bool(True), refuse)
+    assert (np.array(choice.light).tolist(), np.array(choice.pmf).tolist()) == ([0], [1])
 
 
 class TestSampleOfMany:
     @pytest.mark.parametrize("number", [0, 7, 20, 22, 23])
     def test_is_that_of_the_light_alone_by_its_probability(self, number: int) -> None:
-        u, pmf = unit_square(1000), probabilities(MANY)[number]
-        many = Lights.of(*MANY).sample(u, light=number)
+        u, lights = unit_square(1000), Lights.of(*MANY)
+        many = lights.sample(u, light=number)
+        at = Receiver(to_device([ORIGIN]), to_device([UP]))
+        pmf = to_host(lights.pmf(at, TYPES.UInt32([number])))
         alone = Lights.of(MANY[number]).sample(u)
         for a, b in (
             (many.direction, alone.direction),
             (many.distance, alone.distance),
-            (pmf * many.inverse_pdf, alone.inverse_pdf),
+            (to_device(pmf) * many.inverse_pdf, alone.inverse_pdf),
         ):
             many_values, expected = np.broadcast_arrays(to_host(a), to_host(b))
             np.testing.assert_allclose(many_values, expected, rtol=2 * AGREE, atol=UNIT)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.primitives import DIFFUSE, LUMINANCE, Primitives, make_primitives
+from drpt.kernel.primitives import DIFFUSE, Primitives, make_primitives
 from tests.oracle.geometry import any_hit
 
 if TYPE_CHECKING:
@@ -87,15 +87,13 @@ def test_shape_of_no_radiance_is_black() -> None:
     assert len(found.radiance) == 0
 
 
-def test_lights_are_chosen_half_by_power_half_evenly() -> None:
-    colour = (1.0, 2.0, 4.0)
-    found = prepare(drpt.Sphere((4, 0, 0), 0.5, radiance=colour), quad(radiance=3))
-    sphere = 4 * np.pi * 0.5**2
-    assert found.light_areas() == pytest.approx([sphere, 0.5, 0.5], rel=ROUNDING)
-    power = np.array([sphere * (LUMINANCE @ colour), 1.5, 1.5])
-    pmf = np.diff(found.light_cdf(), prepend=0)
-    assert pmf == pytest.approx((power / power.sum() + 1 / 3) / 2, abs=2.0**-23)
-    assert pmf.sum() == 1
+def test_lights_have_areas_and_balls_around_them() -> None:
+    found = prepare(drpt.Sphere((4, 0, 0), 0.5, radiance=1), quad(radiance=3))
+    assert found.light_areas() == pytest.approx([4 * np.pi * 0.5**2, 0.5, 0.5], rel=ROUNDING)
+    balls = found.light_balls()
+    assert balls[0].tolist() == [4, 0, 0, 0.5]
+    away = np.linalg.norm(found.light_corners - balls[1:, None, :3], axis=2)
+    assert away.max(axis=1) == pytest.approx(balls[1:, 3], rel=ROUNDING)
 
 
 def test_a_quad_is_one_facet_and_meshes_stay_apart() -> None:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
+from drpt.kernel.light_tree import LightTree
 from drpt.kernel.mesh import TriangleMesh
-from drpt.kernel.primitives import UNROLL_LIMIT
+from drpt.kernel.primitives import LUMINANCE, UNROLL_LIMIT
 from drpt.kernel.solids import edge_owners
 from drpt.kernel.sphere_tree import SphereTree
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from types import ModuleType
 
     from drjit.auto import Array3f, Array4f, Float, UInt32
@@ -66,10 +67,10 @@ class DeviceScene:
         Rows of 4 by primitive: (albedo, exponent).
     smooth
         18 by smooth triangle: its corners, then the normals there.
-    radiance
-        Rows of 4 by light: (radiance, 1 / pmf).
-    light_area, light_cdf
-        By light.
+    lights
+        Rows of 4 by light: (radiance, area).
+    light_tree
+        Which light is chosen, where there are several.
     light_corners
         Rows of 9 by emitting triangle.
     """
@@ -90,9 +91,8 @@ class DeviceScene:
     geometry: Float
     reflectance: Float
     smooth: Float
-    radiance: Float
-    light_area: Float
-    light_cdf: Float
+    lights: Float
+    light_tree: LightTree | None
     light_corners: Float
     light_count: int
     sphere_lights: int
@@ -101,9 +101,9 @@ class DeviceScene:
         """Normal and offset, or centre and radius."""
         return dr.gather(self.types.Array4f, self.geometry, primitive, active)
 
-    def radiance_row(self, light: UInt32, active: Any = True) -> Array4f:
-        """Radiance and 1 / pmf of a light."""
-        return dr.gather(self.types.Array4f, self.radiance, light, active)
+    def light_row(self, light: UInt32, active: Any = True) -> Array4f:
+        """Radiance and area of a light."""
+        return dr.gather(self.types.Array4f, self.lights, light, active)
 
 
 def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
@@ -113,8 +113,6 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         mapped = types.Float32(values.astype(np.float32).ravel())
         return _own_copy(mapped) if len(mapped) else mapped
 
-    cdf = primitives.light_cdf()
-    pmf = np.diff(cdf, prepend=0)
     triangles = primitives.triangles
     in_light_mesh = primitives.light_corners[len(primitives.light_facets) :]
     few_spheres = len(primitives.spheres) <= UNROLL_LIMIT
@@ -142,13 +140,22 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         smooth=array(
             np.concatenate([primitives.smooth_corners, primitives.smooth_normals], axis=1)
         ),
-        radiance=array(np.column_stack([primitives.radiance, 1 / pmf])),
-        light_area=array(primitives.light_areas()),
-        light_cdf=array(cdf),
+        lights=array(np.column_stack([primitives.radiance, primitives.light_areas()])),
+        light_tree=_light_tree(primitives, types, array),
         light_corners=array(primitives.light_corners),
-        light_count=len(pmf),
+        light_count=len(primitives.radiance),
         sphere_lights=primitives.sphere_lights,
     )
+
+
+def _light_tree(
+    primitives: Primitives, types: ModuleType, upload: Callable[[NDArray[np.float64]], Float]
+) -> LightTree | None:
+    if len(primitives.radiance) < 2:
+        return None
+    power = primitives.light_areas() * (primitives.radiance @ LUMINANCE)
+    power[: primitives.sphere_lights] /= 4  # of a sphere's area, so much faces a receiver
+    return LightTree(primitives.light_balls(), power, types, upload)
 
 
 def _loose(primitives: Primitives, solids: tuple[Solid, ...]) -> Iterator[tuple[int, Facet, bool]]:

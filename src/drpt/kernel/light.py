@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
+from drpt.kernel.light_tree import Choice
 from drpt.kernel.vec import frame, greater, vec3
 from drpt.kernel.warp import (
     TWO_PI,
@@ -50,21 +51,19 @@ class LightSample(NamedTuple):
     inverse_pdf: Float
 
 
-def choose_light(scene: DeviceScene, features: Features, u: Callable[[], Float]) -> UInt32:
+def choose_light(scene: DeviceScene, at: Receiver, active: Bool, u: Callable[[], Float]) -> Choice:
     """Discrete: one of the lights; ``u()`` is asked for where there are several."""
-    if not features.light_choice:
-        return scene.types.UInt32(0)
-    value = u()
-    is_before = lambda i: dr.gather(type(value), scene.light_cdf, i) <= value  # noqa: E731
-    search: Any = dr.binary_search
-    return search(0, scene.light_count - 1, is_before)
+    if scene.light_tree is None:
+        return Choice(scene.types.UInt32(0), scene.types.Float32(1))
+    return scene.light_tree.choose(at, active, u())
 
 
 def sample_light(
-    scene: DeviceScene, features: Features, mode: Mode, at: Receiver, light: UInt32, u: Array2f
+    scene: DeviceScene, features: Features, mode: Mode, at: Receiver, choice: Choice, u: Array2f
 ) -> LightSample:
     """Solid angle: a direction from a receiver to a chosen light."""
-    row = scene.radiance_row(light)
+    light = choice.light
+    row = scene.light_row(light)
     aim = Aim(
         *_by_kind(
             scene,
@@ -75,20 +74,22 @@ def sample_light(
         )
     )
     radiance = vec3(row[0], row[1], row[2])
-    return LightSample(aim.direction, aim.distance, radiance, aim.inverse_pdf * row[3])
+    return LightSample(aim.direction, aim.distance, radiance, aim.inverse_pdf / choice.pmf)
 
 
 def inverse_pdf(
     scene: DeviceScene, features: Features, at: Receiver, light: UInt32, ray: Ray, hit: Hit
 ) -> Float:
     """1 / density with which :func:`sample_light`, sampling caps, finds a receiver's ray."""
-    return scene.radiance_row(light)[3] * _by_kind(
+    inverse = _by_kind(
         scene,
         features,
         light,
         lambda: _cap(scene, at, light).inverse_pdf(dr.dot(at.normal, ray.direction)),
         lambda: _area(scene, light) * -dr.dot(hit.normal, ray.direction) / dr.square(hit.distance),
     )
+    tree = scene.light_tree
+    return inverse if tree is None else inverse / tree.pmf(at, hit.valid, light)
 
 
 def _by_kind(
@@ -195,7 +196,7 @@ def _aim_at_point(point: Array3f, target: Array3f, normal: Array3f, area: Float)
 
 
 def _area(scene: DeviceScene, light: UInt32) -> Float:
-    return dr.gather(scene.types.Float32, scene.light_area, light)
+    return scene.light_row(light)[3]
 
 
 def power_heuristic(ratio: Float) -> Float:

@@ -172,11 +172,11 @@ class Tracer:
         light = scene.types.UInt32(0)
         if scene.light_count > 1:
             light = dr.select(lit, hit.primitive - scene.first_light, 0)
-        row = scene.radiance_row(light)
+        row = scene.light_row(light)
         radiance = vec3(row[0], row[1], row[2])
         if weighted:
             at, ray = Receiver(path.origin, path.normal), Ray(path.origin, path.direction)
-            inverse = inverse_pdf(scene, self.features, at, light, ray, hit)
+            inverse = inverse_pdf(scene, self.features, at, light, ray, hit._replace(valid=lit))
             radiance = radiance * power_heuristic(1 / (inverse * path.pdf))
         return dr.select(lit, radiance, 0)
 
@@ -185,15 +185,17 @@ class Tracer:
     ) -> tuple[Array3f, Bool]:
         """Direct light by one sample of one light, and where that took a shadow ray."""
         scene, features = self.scene, self.features
-        light = choose_light(scene, features, lambda: sampler.next_1d(_decision(depth, 0)))
-        u = sampler.next_2d(_decision(depth, 1))
         at = Receiver(hit.point, hit.shading_normal)
-        sample = sample_light(scene, features, self.mode, at, light, u)
+        number = lambda: sampler.next_1d(_decision(depth, 0))  # noqa: E731
+        choice = choose_light(scene, at, hit.valid, number)
+        u = sampler.next_2d(_decision(depth, 1))
+        sample = sample_light(scene, features, self.mode, at, choice, u)
         value = brdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
         if features.mis:
             value *= power_heuristic(brdf.pdf(sample.direction) * sample.inverse_pdf)
         traced = hit.valid & ~(dr.max(value) <= 0)
-        shadow = occluded(scene, Ray(hit.point, sample.direction), sample.distance, light, traced)
+        ray = Ray(hit.point, sample.direction)
+        shadow = occluded(scene, ray, sample.distance, choice.light, traced)
         return dr.select(traced & ~shadow, value, 0), traced
 
     def _next_direction(

@@ -105,16 +105,12 @@ class Primitives:
         triangles = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
         return np.concatenate([4 * np.pi * radii**2, triangles])
 
-    def light_cdf(self) -> Array:
-        """Cumulative probability of the lights (n,): half by power, half the same for all.
-
-        The even half keeps a weak light that is near from being missed. All values are multiples
-        of 2⁻²⁴, as random numbers are, so that their differences are the exact probabilities.
-        """
-        power = self.light_areas() * (self.radiance @ LUMINANCE)
-        even = np.ones_like(power)
-        pmf = (power / power.sum() + even / even.sum()) / 2
-        return np.asarray(np.round(np.cumsum(pmf) * 2**24) / 2**24)
+    def light_balls(self) -> Array:
+        """Centre and radius (n, 4) of a ball around each light."""
+        spheres = self.spheres[len(self.spheres) - self.sphere_lights :]
+        centers = self.light_corners.mean(axis=1)
+        radii = np.linalg.norm(self.light_corners - centers[:, None], axis=2).max(axis=1)
+        return np.concatenate([spheres, np.column_stack([centers, radii])])
 
     def blockers(self) -> list[bool]:
         """Whether each facet can stand between two points of the scene."""
