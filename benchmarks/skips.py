@@ -134,16 +134,32 @@ def features(**flags: bool) -> Callable[[], list[AbstractContextManager[Any]]]:
 
 
 def choosing(**flags: bool) -> Callable[[], list[AbstractContextManager[Any]]]:
-    """Of two lights, one is never chosen; features as told, too."""
+    """A choice between the light and itself; features as told, too."""
 
     def upload_two(primitives: Primitives, types: ModuleType) -> DeviceScene:
         scene = _upload_something(primitives, types)
-        return replace(scene, light_count=2, light_cdf=types.Float32([1, 1]))
+        return replace(scene, light_count=2, light_tree=_same_light_twice(primitives, types))
 
     return lambda: [
         *features(light_choice=True, **flags)(),
         patch("drpt.kernel.launch.upload", upload_two),
     ]
+
+
+def _same_light_twice(primitives: Primitives, types: ModuleType) -> Any:
+    import drjit as dr
+
+    from drpt.kernel.light_tree import Choice, LightTree
+
+    class SameLight(LightTree):
+        def choose(self, *arguments: Any) -> Choice:
+            found = super().choose(*arguments)
+            nothing = dr.opaque(types.UInt32, 0)
+            return Choice(found.light & nothing, dr.select(found.pmf > 1, found.pmf, 1))
+
+    balls = np.repeat(primitives.light_balls(), 2, axis=0)
+    upload = lambda values: types.Float32(values.astype(np.float32).ravel())  # noqa: E731
+    return SameLight(balls, np.ones(2), types, upload)
 
 
 def _upload_something(primitives: Primitives, types: ModuleType) -> DeviceScene:
