@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.error import DARK, INDEPENDENT, relative_mse, squared_differences, standard_error
+from drpt.error import DARK, INDEPENDENT, relative_mse, squared_differences
+from drpt.error import estimate as estimated
 from drpt.film import Film
 from tests.scenes import LAMP_AND_BALL, seen_by
 
@@ -61,7 +62,7 @@ def estimate(samples: Floats, *, independent: bool) -> tuple[Floats, Floats]:
     differences = squared_differences(blocks, film.size).reshape(-1, *shape)
     growth = len(samples) / (len(blocks) * film.size) if len(blocks) else 1.0
     image = film.mean.reshape(shape)
-    return image, standard_error(differences, image, growth, independent=independent)
+    return image, estimated(differences, image, growth, independent=independent)[0]
 
 
 def covered(image: AnyFloats, truth: Floats | float, errors: AnyFloats) -> float:
@@ -265,6 +266,6 @@ def test_the_gate_sees_sobol_points_that_are_taken_as_independent() -> None:
     scene = seen_by(drpt.load_scene("cornell-box"), *SIZE)
     result = drpt.render(scene, 256, 2, "explicit", seed=5)
     image = result.image.astype(np.float64)
-    wrong = standard_error(differences_of(result), image, 1.0, independent=True)
+    wrong, _ = estimated(differences_of(result), image, 1.0, independent=True)
     assert relative_mse(wrong**2, image) > (1 + TRUE) * true_error(result, truth_of("cornell-box"))
     assert INDEPENDENT == 2

@@ -42,7 +42,7 @@ WINDOW = 5
 def relative_mse(squares: Array, image: Array) -> float:
     """Mean of e² / (x² + 0.01) over pixels and channels, (height, width, 3) each.
 
-    ``squares`` are e², ``image`` is x and their noise: see `_weights`.
+    ``squares`` are e², variances of the image x, which stands for the truth: see `_weights`.
     """
     return float(np.mean(squares * _weights(image, squares)))
 
@@ -61,10 +61,12 @@ def squared_differences(blocks: NDArray[np.float32], size: int) -> NDArray[np.fl
         return np.stack([np.square(a + b - c - d), fine])
 
 
-def standard_error(
+def estimate(
     differences: NDArray[np.float32], image: Array, growth: float, *, independent: bool
-) -> Array:
-    """Standard errors (height, width, 3) of an image of that shape; not a number if unknown.
+) -> tuple[Array, float]:
+    """Standard errors (height, width, 3) of an image of that shape, and its relMSE.
+
+    They are not a number if unknown.
 
     Parameters
     ----------
@@ -78,15 +80,14 @@ def standard_error(
         Whether samples are independent; else they are Sobol' points.
     """
     if not len(differences):
-        return np.full_like(image, np.nan)
+        return np.full_like(image, np.nan), np.nan
     weights = _weights(image, _average(differences[0].astype(np.float64), WINDOW))
     coarse, *fine = (level.astype(np.float64) * weights for level in differences)
     ratio = INDEPENDENT if independent or not fine else _ratio(coarse, fine[0])
     for level in fine:  # two of them for each coarse one
         coarse = (coarse + 2 * level / ratio) / 3
-    squares = _average(coarse, WINDOW) / weights / (ratio - 1)
-    errors: Array = np.sqrt(squares * _fall(growth, ratio))
-    return errors
+    weighted = _average(coarse, WINDOW) * (_fall(growth, ratio) / (ratio - 1))
+    return np.sqrt(weighted / weights), float(weighted.mean())
 
 
 def _fall(growth: float, ratio: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import closing
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from os import PathLike
@@ -383,10 +384,13 @@ def render(  # noqa: PLR0913 -- a setting each
         checkpoint_interval=checkpoint_interval,
     )
     check_switch("layers", layers)
-    passes = rendering.passes()
-    for _ in with_bar(rendering, passes) if check_switch("progress", progress) else passes:
-        if on_pass is not None:
-            on_pass(rendering.result())
+    if on_pass is not None and not callable(on_pass):
+        raise refuse("on_pass", on_pass, "a function that takes a Result")
+    bar = check_switch("progress", progress)
+    with closing(rendering.passes()) as passes:
+        for _ in with_bar(rendering, passes) if bar else passes:
+            if on_pass is not None:
+                on_pass(rendering.result())
     result = rendering.result()
     if layers:
         result = replace(result, layers={**result.layers, **rendering.first_hits()})

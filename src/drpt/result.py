@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drpt.error import relative_mse, standard_error
+from drpt.error import estimate
 from drpt.notebook import figure
 from drpt.output import write
 from drpt.scene.saving import to_toml
@@ -85,28 +85,31 @@ class Result:
         """Paths traced: width × height × spp."""
         return int(self.image.size // 3 * self.spp)
 
-    @cached_property
+    @property
     def standard_error(self) -> NDArray[np.float32]:
         """Standard error of every value of the image, float32 (height, width, 3).
 
         Not a number with a single sample, where the error was turned off, and in pictures that
         an exception left amid a pass. See :mod:`drpt.error`.
         """
+        return self._estimate[0]
+
+    @property
+    def error(self) -> float:
+        """Estimated relMSE of the image, mean (x − truth)² / (truth² + 0.01)."""
+        return self._estimate[1]
+
+    @cached_property
+    def _estimate(self) -> tuple[NDArray[np.float32], float]:
         if self._differences is None:
-            return np.full_like(self.image, np.nan)
-        errors = standard_error(
+            return np.full_like(self.image, np.nan), np.nan
+        errors, relative_mse = estimate(
             self._differences,
             self.image.astype(np.float64),
             self._growth,
             independent=self.sampler == "independent",
         )
-        return errors.astype(np.float32)
-
-    @cached_property
-    def error(self) -> float:
-        """Estimated relMSE of the image, mean (x − truth)² / (truth² + 0.01)."""
-        squares = np.square(self.standard_error.astype(np.float64))
-        return relative_mse(squares, self.image.astype(np.float64))
+        return errors.astype(np.float32), relative_mse
 
     def denoise(self) -> Result:
         """Denoise the image by Open Image Denoise, guided by albedo and normal if it has them.
