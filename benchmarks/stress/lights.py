@@ -15,6 +15,7 @@ from drpt.crosscheck.variant import load_mitsuba
 from drpt.kernel.device_scene import upload
 from drpt.kernel.estimator import Features
 from drpt.kernel.light import Receiver, sample_light
+from drpt.kernel.light_tree import Choice
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SobolSampler
 from tests.conftest import TYPES, to_device, to_host
@@ -58,7 +59,8 @@ def in_drpt(light: Sphere, normal: Floats, samples: int) -> float:
     scene = upload(primitives, TYPES)
     features = Features.of(primitives, 1, Mode.EXPLICIT)
     at = Receiver(to_device([ORIGIN - primitives.origin]), to_device([normal]))
-    sample = sample_light(scene, features, Mode.EXPLICIT, at, TYPES.UInt32([0]), sobol(samples))
+    choice = Choice(TYPES.UInt32([0]), TYPES.Float32(1))
+    sample = sample_light(scene, features, Mode.EXPLICIT, at, choice, sobol(samples))
     cosine = np.maximum(to_host(sample.direction) @ normal, 0)
     return float((to_host(sample.inverse_pdf) * cosine).mean())
 
