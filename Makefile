@@ -10,10 +10,10 @@ demo: $(STAMP)  ## render the Cornell box
 		-o out/cornell-box.exr -o out/cornell-box.png
 
 test: $(STAMP)  ## every test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-quick: $(STAMP)  ## the tests that take no more than a few seconds
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 lint: $(STAMP)  ## what CI checks before the tests
 	$(BIN)/ruff check .

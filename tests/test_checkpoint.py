@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.checkpoint import BODY, MAGIC, Checkpoint, CheckpointError
+from drpt.checkpoint import BODY, FORMAT, MAGIC, Checkpoint, CheckpointError
 from drpt.kernel.launch import Launcher
 from tests.scenes import BALL, LAMP, LAMP_AND_BALL, scene_of
 
@@ -210,7 +210,8 @@ class TestWhenItIsSaved:
         passes = rendering_of(path).passes()
         for done in range(16, 100, 16):
             assert next(passes) == done
-            assert rendering_of(path).spp == done
+            copy = shutil.copy(path, path.with_name("copy.drpt"))
+            assert rendering_of(Path(copy)).spp == done
 
     def test_it_takes_the_place_of_the_one_before_and_leaves_no_other_file(
         self, path: Path
@@ -325,7 +326,9 @@ class TestDamage:
             damaged = bytearray(saved)
             damaged[place] ^= 1 << (place % 8)
             message = self.refuse(bytes(damaged), path)
-            expected = "is no checkpoint" if place < len(MAGIC) else "is damaged"
+            expected = "is damaged"
+            if place < len(MAGIC):
+                expected = "is no checkpoint" if place < len(FORMAT) else "its format is"
             assert expected in message
 
     def test_a_missing_end_is_seen(self, saved: bytes, path: Path) -> None:
@@ -367,6 +370,24 @@ class TestDamage:
                 assert all(array.dtype.kind in "fU" for array in archive.values())
 
 
+class TestLock:
+    def test_another_render_is_kept_off_until_the_passes_end(self, path: Path) -> None:
+        passes = rendering_of(path).passes()
+        next(passes)
+        with pytest.raises(CheckpointError, match="another render is using it"):
+            rendering_of(path)
+        passes.close()
+        assert rendering_of(path).spp == 16
+
+    def test_a_callback_that_raises_leaves_a_checkpoint_and_no_lock(self, path: Path) -> None:
+        def fail(_: drpt.Result) -> None:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            drpt.render(LAMP_AND_BALL, checkpoint=path, on_pass=fail, **SETTINGS)
+        assert rendering_of(path).spp == 16
+
+
 class TestPlaces:
     def test_a_missing_folder_is_found_before_the_render(self, tmp_path: Path) -> None:
         with pytest.raises(FileNotFoundError, match=r"state\.drpt: the folder .* does not exist"):
@@ -401,6 +422,7 @@ class TestPlaces:
             next(passes)
         folder.mkdir()
         next(passes)
+        passes.close()
         assert rendering_of(folder / "state.drpt").spp == 48
 
     def test_a_full_disk_is_warned_about_and_leaves_the_state_before(
@@ -434,6 +456,7 @@ class TestPlaces:
 KILLS = 20
 CHILD = """
 import sys
+import time
 import numpy as np
 import drpt
 import drpt.plan
@@ -447,7 +470,7 @@ rendering = drpt.Rendering(
 )
 print(rendering.spp, flush=True)
 for _ in rendering.passes():
-    pass
+    time.sleep(0.03 if path else 0)  # lest it be over before the last kill
 result = rendering.result()
 facts = result.image.tobytes(), result.standard_error.tobytes()
 print(hash(facts), result.spp, result.rays, result.non_finite)
@@ -466,7 +489,10 @@ def start_child(spp: int, *arguments: str) -> subprocess.Popen[str]:
 
 @pytest.mark.slow
 def test_a_render_killed_twenty_times_has_the_bits_of_one_that_was_not(path: Path) -> None:
-    """Of 512 passes, in two launches each, some run between two kills; or none."""
+    """Of 512 passes, in two launches each, some run between two kills; or none.
+
+    They take 15 s at the least, and 20 children live for 15 s at the most.
+    """
     spp, chance = 2**13, random.Random(1)
     with start_child(spp) as child:
         expected = child.communicate()[0].splitlines()[-1]

@@ -218,14 +218,14 @@ HONEST: dict[str, tuple[int, str]] = {
 }
 SAMPLERS = "sobol", "independent"
 # Glossy plates and what is diffuse around them have a ρ each, and one for all takes too small an
-# error for both: 0.79 of the true one at 64 samples, 0.85 at 100.
+# error for both: 0.73 of the true one, over 12 seeds.
 TOO_SMALL = pytest.mark.xfail(strict=True, reason="one ratio for places of different ones")
 CASES = [
     pytest.param(name, sampler, marks=TOO_SMALL if (name, sampler) == ("veach", "sobol") else ())
     for name, sampler in product(HONEST, SAMPLERS)
 ]
-SIZE = 128, 96
-SEEDS = 5, 6, 7  # so that no single firefly decides
+SIZE = 192, 128
+SEEDS = range(5, 10)  # so that no single firefly decides
 TRUTH_SPP = 2048  # its own error, as it tells it, is taken off
 INSIDE = 0.92, 0.98
 TRUE = 0.15
@@ -245,12 +245,11 @@ def true_error(result: drpt.Result, truth: drpt.Result) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("spp", [64, 100])
 @pytest.mark.parametrize(("name", "sampler"), CASES)
-def test_the_error_of_renders_is_honest(name: str, sampler: str, spp: int) -> None:
+def test_the_error_of_renders_is_honest(name: str, sampler: str) -> None:
     truth, (bounces, mode) = truth_of(name), HONEST[name]
     exact = truth.image.astype(np.float64)
-    settings: Any = {"spp": spp, "bounces": bounces, "mode": mode, "sampler": sampler}
+    settings: Any = {"spp": 64, "bounces": bounces, "mode": mode, "sampler": sampler}
     found = [drpt.render(truth.scene, seed=seed, **settings) for seed in SEEDS]
     inside = [
         covered(r.image, exact, np.hypot(r.standard_error, truth.standard_error)) for r in found

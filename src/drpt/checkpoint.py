@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import tempfile
 import zipfile
+from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -18,20 +21,21 @@ from drpt.output import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
     from typing import BinaryIO
 
+    from filelock import BaseFileLock
     from numpy.typing import NDArray
 
     Facts = Mapping[str, str | int | float | bool | list[int] | list[float] | None]
     Arrays = Mapping[str, NDArray[Any]]
 
-MAGIC = b"drpt checkpoint 1\n"
+FORMAT = b"drpt checkpoint "
+MAGIC = FORMAT + b"1\n"
 BODY = len(MAGIC) + hashlib.sha256().digest_size
 
 
 class CheckpointError(ValueError):
-    """A file is no checkpoint, is damaged, or belongs to another render."""
+    """A file is no checkpoint, is damaged, in use, or belongs to another render."""
 
 
 class Checkpoint:
@@ -52,6 +56,22 @@ class Checkpoint:
         self._identity = dict(identity)
         self._interval = interval
         self._last = monotonic()
+        self._token = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:16]
+        self._lock = _machine_lock(self._token)
+
+    def lock(self) -> None:
+        """Keep other processes off until :meth:`unlock`; raises `CheckpointError` if one is on."""
+        from filelock import Timeout
+
+        if not self._lock.is_locked:
+            try:
+                self._lock.acquire(timeout=0)
+            except Timeout:
+                raise CheckpointError(f"{self.path}: another render is using it") from None
+
+    def unlock(self) -> None:
+        """Let others have it."""
+        self._lock.release()
 
     def load(self) -> tuple[dict[str, Any], Arrays] | None:
         """Facts and arrays that were saved last; None if there is no file.
@@ -71,7 +91,7 @@ class Checkpoint:
     def save(self, facts: Facts, arrays: Arrays) -> None:
         """Replace what was saved before; raises `OSError` where that fails."""
         text = json.dumps({"identity": self._identity, "facts": facts})
-        with replacing(self.path, token=self.path.name) as stream:
+        with replacing(self.path, token=self._token) as stream:
             stream.write(MAGIC.ljust(BODY, b"\0"))
             np.savez(stream, allow_pickle=False, state=np.array(text), **arrays)
             digest = _digest(stream)
@@ -80,10 +100,22 @@ class Checkpoint:
         self._last = monotonic()
 
 
+def _machine_lock(token: str) -> BaseFileLock:
+    """A lock of this user on this machine; its empty file stays, away from the checkpoint."""
+    from filelock import FileLock
+
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    return FileLock(Path(tempfile.gettempdir(), f"drpt-{user}-{token}.lock"))
+
+
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     with open(path, "rb") as stream:
-        if stream.read(len(MAGIC)) != MAGIC:
-            raise CheckpointError(f"{path}: this is no checkpoint of this version of drpt")
+        magic = stream.readline(len(MAGIC))
+        if not magic.startswith(FORMAT):
+            raise CheckpointError(f"{path}: this is no checkpoint of drpt")
+        if magic != MAGIC:
+            there, here = (line.removeprefix(FORMAT).strip().decode() for line in (magic, MAGIC))
+            raise CheckpointError(f"{path}: its format is {there}, and this version reads {here}")
         if stream.read(BODY - len(MAGIC)) != _digest(stream):
             raise CheckpointError(f"{path}: it is damaged: its checksum is not that of its content")
         stream.seek(BODY)

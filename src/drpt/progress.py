@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from rich.console import Console
+    from rich.console import Console as _Console
 
     from drpt.render import Rendering
 
@@ -17,9 +17,13 @@ GROWTH = 1.5
 
 
 def with_bar(
-    rendering: Rendering, passes: Generator[int], console: Console | None = None
+    rendering: Rendering, passes: Generator[int], console: _Console | None = None
 ) -> Generator[int]:
-    """Draw a bar while the passes run, which vanishes after the last: spp, error, speed, time."""
+    """Draw a bar while the passes run, which vanishes after the last: spp, error, speed, time.
+
+    On stderr, if that is a terminal, or in a notebook; else there is none.
+    """
+    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -31,12 +35,16 @@ def with_bar(
     )
     settings = rendering.settings
     start, before, looked = perf_counter(), rendering.spp, 0
-    with Progress(*columns, console=console, transient=True) as bar:
+    console = console or Console(stderr=True)
+    hidden = not (console.is_terminal or console.is_jupyter)
+    with Progress(*columns, console=console, transient=True, disable=hidden) as bar:
         task = bar.add_task("", total=settings.spp, completed=before, speed=0.0, error="")
         for spp in passes:
-            speed = settings.pixels * (spp - before) / (perf_counter() - start) / 1e6
+            seconds = perf_counter() - start
+            speed = settings.pixels * (spp - before) / seconds / 1e6
             bar.update(task, completed=spp, speed=speed)
-            if spp >= GROWTH * looked:
-                looked = spp
-                bar.update(task, error=f"relMSE {rendering.result().error:.1e}")
+            if not hidden and spp >= GROWTH * looked:
+                looked, error = spp, rendering.result().error
+                total = rendering.expected_spp(seconds / (spp - before), error)
+                bar.update(task, error=f"relMSE {error:.1e}", total=total)
             yield spp

@@ -95,15 +95,23 @@ class Rendering:
         """Samples that each pixel has got so far."""
         return self._film.samples
 
+    def expected_spp(self, seconds: float, error: float) -> float:
+        """Samples per pixel that there will be, given the seconds of one and the error by now."""
+        return min(self.settings.spp, self._stopping.expected_spp(self.spp, seconds, error))
+
     def passes(self) -> Generator[int]:
         """Run the passes that have not run yet; yields after each the samples per pixel so far.
 
         Where the iterator ends, whether it is exhausted or closed, the checkpoint is saved.
         """
+        if self._checkpoint:
+            self._checkpoint.lock()
         try:
             yield from self._passes()
         finally:
             self._save()
+            if self._checkpoint:
+                self._checkpoint.unlock()
 
     def _passes(self) -> Generator[int]:
         self._stopping.start()
@@ -250,6 +258,7 @@ class Rendering:
         path = Path(path)
         check_file(path)
         checkpoint = Checkpoint(path, self._identity(), interval)
+        checkpoint.lock()
         if saved := checkpoint.load():
             facts, arrays = saved
             self._film.restore(arrays["total"], arrays["blocks"], facts["spp"], facts["block"])

@@ -58,6 +58,16 @@ class Stopping:
         self.last_look = spp, error()
         return self.last_look[1] <= self._target
 
+    def expected_spp(self, spp: int, seconds: float, error: float) -> float:
+        """About after how many samples it stops, given the seconds of one and the error of ``spp``.
+
+        The error is taken to fall as 1 / samples, as that of independent ones does.
+        """
+        left = np.inf if self._limit is None else self._limit - (perf_counter() - self._start)
+        by_time = spp + max(left, 0) / seconds
+        by_error = spp * error / self._target if self._target and error > 0 else np.inf
+        return float(max(spp, min(by_time, by_error)))
+
     def _next_look(self, target: float) -> float:
         """Samples from which on the error is worth to be asked for."""
         if self.last_look is None or not target < self.last_look[1] < np.inf:

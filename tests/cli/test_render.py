@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import inspect
 import os
 import pty
@@ -12,6 +13,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from contextlib import suppress
@@ -102,7 +104,10 @@ BAD_FLAGS = {
     "checkpoint interval": (["--checkpoint-interval", "0"], ("checkpoint_interval", "0")),
     "checkpoint in no folder": (["--checkpoint", "no/a.drpt"], ("no/a.drpt", "does not exist")),
     "checkpoint is a folder": (["--checkpoint", "."], (".: this is a folder",)),
-    "checkpoint is no checkpoint": (["--checkpoint", "good.toml"], ("good.toml: this is no ch",)),
+    "checkpoint is no checkpoint": (
+        ["--checkpoint", "good.toml"],
+        ("good.toml: this is no checkpoint",),
+    ),
     "checkpoint is a picture": (["--checkpoint", "./a.exr", "-o", "a.exr"], ("checkpoint: a.exr",)),
     "tev": (["--tev", "host:port"], ("tev: 'host:port' is not allowed", "localhost:14158")),
     "second output": (["-o", "a.exr", "-o", "a.tiff"], ("a.tiff",)),
@@ -476,10 +481,18 @@ class TestCheckpoint:
     ) -> None:
         shut = Path("shut")
         shut.mkdir()
+
         # As the system answers whoever is not root, who may write everywhere.
-        monkeypatch.setattr(os, "access", lambda path, _: Path(path) != shut)
+        opened = tempfile.TemporaryFile
+
+        def refuse(**arguments: Any) -> Any:
+            if arguments["dir"] == shut:
+                raise PermissionError(errno.EACCES, "Permission denied")
+            return opened(**arguments)
+
+        monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
         argv = ["good.toml", "--checkpoint", "shut/a.drpt"]
-        assert_refused(capsys, argv, ("shut/a.drpt", "may not be written to"))
+        assert_refused(capsys, argv, ("shut/a.drpt", "cannot be written to"))
 
     @pytest.mark.usefixtures("fake")
     @pytest.mark.filterwarnings("default")

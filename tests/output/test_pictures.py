@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -165,8 +167,18 @@ class TestCheckTarget:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         # Root may write anywhere, so that a real folder would not do.
-        monkeypatch.setattr(os, "access", lambda place, mode: Path(place) != tmp_path)
-        with pytest.raises(PermissionError, match="may not be written to"):
+        def refuse(*_: object, **__: object) -> None:
+            raise PermissionError(errno.EACCES, "Permission denied")
+
+        monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+        with pytest.raises(PermissionError, match="Permission denied"):
+            check_target(tmp_path / "a.exr")
+
+    @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+    def test_refuses_a_full_disk(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        full = lambda **_: open("/dev/full", "wb", 0)  # noqa: E731, SIM115
+        monkeypatch.setattr(tempfile, "TemporaryFile", full)
+        with pytest.raises(OSError, match="No space left"):
             check_target(tmp_path / "a.exr")
 
     def test_is_what_write_does_first(self, tmp_path: Path) -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import secrets
+import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+BLOCK = 4096
+"""Bytes that a disk must have left."""
 
 
 def check_file(path: Path) -> None:
@@ -30,8 +34,12 @@ def check_file(path: Path) -> None:
         raise FileNotFoundError(f"{path}: the folder {folder} does not exist")
     if not folder.is_dir():
         raise NotADirectoryError(f"{path}: {folder} is not a folder")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(f"{path}: the folder {folder} may not be written to")
+    try:
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            file.write(bytes(BLOCK))
+    except OSError as error:
+        reason = f"the folder {folder} cannot be written to ({error.strerror or error})"
+        raise type(error)(f"{path}: {reason}") from error
 
 
 @contextmanager
@@ -39,12 +47,15 @@ def replacing(path: Path, token: str | None = None) -> Iterator[BinaryIO]:
     """Open a new file that takes the place of `path` once it is written without an error.
 
     Its name until then holds a ``token``, a random one by default. One that is always the same for
-    a path leaves no more than one file behind, however often the process is killed.
+    a path leaves no more than one file behind, however often the process is killed; who gives it
+    sees to it that no other process writes there.
     """
     target = _target(path)
     temporary = target.with_name(f".drpt-{token or secrets.token_hex(8)}.tmp")
+    if token:
+        temporary.unlink(missing_ok=True)
     try:
-        with open(temporary, "w+b" if token else "x+b") as stream:
+        with open(temporary, "x+b") as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())

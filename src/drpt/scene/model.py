@@ -27,6 +27,8 @@ MIN_SINE = 1e-6
 """Smallest sine of the angle between a camera's up and its view direction."""
 UNIT_TOLERANCE = 1e-14
 """Normals this close to unit length, some float64 roundings, are kept to the bit."""
+FAR_EXPONENT = 500
+"""Squares of numbers farther from 1 than this power of 2 are near the ends of float64."""
 
 
 @dataclass(frozen=True, init=False)
@@ -339,6 +341,9 @@ def _unit_normals(normals: ArrayLike, count: int) -> NDArray[np.float64]:
     vectors = checks.vectors("normals", normals)
     if len(vectors) != count:
         raise SceneError(f"there are {len(vectors)}, but {count} vertices", "normals")
+    _, exponents = np.frexp(np.abs(vectors).max(axis=1, initial=0, keepdims=True))
+    far = np.abs(exponents) > FAR_EXPONENT
+    vectors = np.where(far, np.ldexp(vectors, -exponents), vectors)
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     if not lengths.all():
         row = int(np.flatnonzero(lengths == 0)[0])
