@@ -61,7 +61,7 @@ class Preview:
             self._lost = True
             reason = getattr(error, "strerror", None) or error
             at = f"{self._host}:{self._port}"
-            text = f"no preview: tev cannot be reached at {at} ({reason}); is it running there?"
+            text = f"no preview: tev at {at} takes no picture ({reason}); is it running there?"
             warnings.warn(text, RuntimeWarning, stacklevel=2)
 
     def _send(self, image: NDArray[np.float32]) -> None:
