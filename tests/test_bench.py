@@ -79,9 +79,17 @@ def test_time_outside_of_the_points_goes_as_one_over_error(target: float) -> Non
 
 
 def test_time_beyond_the_last_point_goes_on_along_the_slope() -> None:
-    time, extrapolated = metrics.time_to(0.001, [1.0, 2.0], [0.4, 0.1])  # error ∝ 1 / time²
-    assert time == pytest.approx(20, rel=ROUNDING)
+    slope = 4 ** (1 / 1.25)  # error ∝ 1 / time^1.25
+    time, extrapolated = metrics.time_to(0.1 / 4, [1.0, slope], [0.4, 0.1])
+    assert time == pytest.approx(slope**2, rel=ROUNDING)
     assert extrapolated
+
+
+def test_time_beyond_the_last_point_heeds_no_slope_that_cannot_last() -> None:
+    assert metrics.time_to(0.05, [1.0, 1.1], [0.4, 0.1]).seconds == pytest.approx(
+        1.1 * 2 ** (2 / 3)
+    )
+    assert metrics.time_to(0.05, [1.0, 4.0], [0.2, 0.1]).seconds == pytest.approx(8)
 
 
 def test_one_point_has_no_slope() -> None:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     Image = NDArray[np.floating]
 
 
+SLOPES = -1.5, -1.0
+"""Log error over log time in the end: of Sobol' points at edges, and of independent samples."""
+
+
 class Bias(NamedTuple):
     """Relative difference of the image means, and its standard error."""
 
@@ -67,13 +71,14 @@ def slope(seconds: Sequence[float], errors: Sequence[float]) -> float | None:
 def time_to(target: float, seconds: Sequence[float], errors: Sequence[float]) -> Reach:
     """Seconds to an error, by a line through two neighbouring points in log–log.
 
-    Beyond the last point, error goes on to fall by the slope of the last decade; before the first
-    one, as 1 / time.
+    Beyond the last point, error goes on to fall by the slope of the last decade, within `SLOPES`;
+    before the first one, as 1 / time.
     """
     inside = [i for i in range(1, len(errors)) if errors[i] <= target < errors[i - 1]]
     if not inside:
         reached = errors[0] <= target
-        nearest, power = (0, -1.0) if reached else (-1, slope(seconds, errors) or -1.0)
+        power = -1.0 if reached else float(np.clip(slope(seconds, errors) or -1.0, *SLOPES))
+        nearest = 0 if reached else -1
         return Reach(float(seconds[nearest] * (target / errors[nearest]) ** (1 / power)), True)
     pair = slice(inside[0] - 1, inside[0] + 1)
     log_errors, log_seconds = np.log(errors[pair])[::-1], np.log(seconds[pair])[::-1]
