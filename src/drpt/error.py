@@ -19,7 +19,7 @@ of four independent replicates has 1.5 to 2 times the relMSE in the Cornell boxe
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -133,9 +133,13 @@ def _of_neighbours(values: Array) -> Array:
 
 
 def _average(values: Array, side: int) -> Array:
-    """Means over squares of pixels."""
-    from scipy.ndimage import correlate1d
-
-    kernel = np.full(side, 1 / side)
-    average: Any = correlate1d(correlate1d(values, kernel, axis=0), kernel, axis=1)
-    return np.asarray(average)
+    """Means over squares of pixels, mirrored beyond the edges."""
+    for axis in (0, 1):
+        count, margin = values.shape[axis], [(0, 0)] * values.ndim
+        margin[axis] = side // 2, side // 2
+        padded = np.moveaxis(np.pad(values, margin, mode="symmetric"), axis, 0)
+        total = padded[:count] / side
+        for k in range(1, side):
+            total += padded[k : k + count] / side
+        values = np.moveaxis(total, 0, axis)
+    return values
