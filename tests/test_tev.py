@@ -117,7 +117,7 @@ def test_a_picture_appears_and_follows(viewer: Viewer) -> None:
 def test_without_a_viewer_one_line_and_the_render_goes_on() -> None:
     preview = Preview(f"127.0.0.1:{unused_port()}", "box")
     with pytest.warns(
-        RuntimeWarning, match=r"^no preview: tev .* 127.0.0.1:\d+ \(.*refused"
+        RuntimeWarning, match=r"^no preview: tev at 127.0.0.1:\d+ .*\(.*refused"
     ) as told:
         preview.update(IMAGE)
     assert "\n" not in str(told[0].message)
