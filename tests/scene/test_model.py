@@ -105,7 +105,7 @@ def test_mesh_arrays_are_read_only_copies() -> None:
 
 @given(st.lists(st.tuples(*3 * [st.floats(-1e9, 1e9)]), min_size=3, max_size=3))
 def test_normals_have_unit_length_and_stay_as_they_are(normals: list[Any]) -> None:
-    if not all(np.linalg.norm(normals, axis=1)):
+    if not np.abs(normals).max(axis=1).all():
         refusal_of_zero = pytest.raises(SceneError, match="longer than 0")
         with refusal_of_zero:
             Mesh(TRIANGLE, FACES, normals, GREY)
