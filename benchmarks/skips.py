@@ -180,7 +180,7 @@ def _light_code() -> list[AbstractContextManager[Any]]:
     from drpt.kernel.path import Tracer
 
     def first_vertex(self: Tracer, ray: Any, sampler: Any) -> Vertex:
-        return self._arrive(self.start(ray), sampler, _opaque(self.scene.types.UInt32, 0))
+        return self.arrive(self.start(ray), sampler, _opaque(self.scene.types.UInt32, 0))
 
     flags = {"diffuse": True, "direct_light": True, "sphere_light_samples": True}
     return [*features(**flags)(), patch.object(Tracer, "first_vertex", first_vertex)]
@@ -190,7 +190,7 @@ def _last_ray() -> list[AbstractContextManager[Any]]:
     """A ray after the last bounce, whose hit only the device knows to give nothing."""
     from drpt.kernel.path import Tracer
 
-    arrive = Tracer._arrive
+    arrive = Tracer.arrive
 
     def arrive_after_all(self: Tracer, path: Path, sampler: Any, depth: Any) -> Vertex:
         import drjit as dr
@@ -203,7 +203,7 @@ def _last_ray() -> list[AbstractContextManager[Any]]:
 
     vertices = property(lambda self: self.bounces + 1)
     return [
-        patch.object(Tracer, "_arrive", arrive_after_all),
+        patch.object(Tracer, "arrive", arrive_after_all),
         patch.object(Tracer, "vertices", vertices),
     ]
 

@@ -11,6 +11,7 @@ from drpt.plan import (
     LAUNCH_LANES,
     LAUNCH_PATHS,
     LAUNCH_PIXELS,
+    LEAST_PASS,
     parts,
     plan_passes,
     run_length,
@@ -61,6 +62,17 @@ def test_a_plan_can_be_taken_up_after_any_pass(pixels: int, spp: int, growing: b
     for number, samples in enumerate(whole[:90]):
         rest = list(islice(plan_passes(pixels, spp, samples.stop, growing=growing), 5))
         assert rest == whole[number + 1 : number + 6]
+
+
+@pytest.mark.parametrize("pixels", PIXELS)
+def test_fewer_paths_make_shorter_passes_that_others_can_follow(pixels: int) -> None:
+    short = list(islice(plan_passes(pixels, 2**34, paths=LAUNCH_PATHS // 64), 3))
+    assert len({len(samples) for samples in short}) == 1
+    longest = len(next(plan_passes(pixels, 2**34)))
+    assert len(short[0]) == max(LEAST_PASS, longest // 64)
+    after = list(islice(plan_passes(pixels, 2**34, short[-1].stop), 20))
+    assert all(samples.start % len(samples) == 0 for samples in after)
+    assert len(after[-1]) == longest
 
 
 def test_plans_depend_on_resolution_and_spp_alone() -> None:

@@ -104,7 +104,7 @@ def repeated(samples: float, _: int) -> float:
     places = {(1, 0, 0): (-0.4, -0.4, 0), (0, 1, 0): (0.4, -0.4, 0), (0, 0, 1): (0, 0.4, 0)}
     lights = [Sphere(center, 0.4, radiance=colour) for colour, center in places.items()]
     scene = Scene(Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 20, 1, 1), lights)
-    launcher = Rendering(scene, int(samples), 0, sampler="independent").launcher()
+    launcher = Rendering(scene, int(samples), 0, sampler="independent").launcher
     passes = [
         launcher.launch(range(1), part, run_length(1, part, 1), 0).radiance.sum(axis=0)[0]
         for part in plan_passes(1, int(samples))

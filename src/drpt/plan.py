@@ -9,6 +9,8 @@ if TYPE_CHECKING:
 
 LAUNCH_PATHS = 2**24
 """Paths of a pass for so many pixels as `PASS_PIXELS`: long enough to be worth it."""
+LEAST_PASS = 4
+"""Samples of a pass at the least: so many may share a camera ray."""
 PASS_PIXELS = 2**20
 """Larger pictures take longer passes."""
 LAUNCH_PIXELS = 2**18
@@ -21,14 +23,23 @@ FIRST_PASS = 16
 """Samples of the first pass of a render that may stop early."""
 
 
-def plan_passes(pixels: int, spp: int, done: int = 0, *, growing: bool = False) -> Iterator[range]:
+def plan_passes(
+    pixels: int,
+    spp: int,
+    done: int = 0,
+    *,
+    growing: bool = False,
+    paths: int | None = None,
+) -> Iterator[range]:
     """Passes of a render, as ranges of samples; they depend on the resolution and spp alone.
 
     All but the last take the same power of two of samples, so none of them crosses a multiple
     of 2³², where a sampler's index begins anew. Those of a render that may stop early are
-    ``growing`` up to there. A plan can be taken up where any pass was ``done``.
+    ``growing`` up to there. A plan can be taken up where any pass was ``done``, and with fewer
+    ``paths`` a pass where what has come is to be seen soon.
     """
-    longest = 1 << ((LAUNCH_PATHS // min(pixels, PASS_PIXELS)).bit_length() - 1)
+    share = max(LEAST_PASS, (paths or LAUNCH_PATHS) // min(pixels, PASS_PIXELS))
+    longest = 1 << (share.bit_length() - 1)
     while done < spp:
         count = min(longest, FIRST_PASS) if growing and not done else longest
         if done % longest:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.launch import Launcher, Sums
+    from drpt.kernel.recording import Vertices
     from drpt.scene import Scene
 
 __all__ = [
@@ -99,27 +101,29 @@ class Rendering:
         """Samples per pixel that there will be, given the seconds of one and the error by now."""
         return min(self.settings.spp, self._stopping.expected_spp(self.spp, seconds, error))
 
-    def passes(self) -> Generator[int]:
+    def passes(self, paths: int | None = None) -> Generator[int]:
         """Run the passes that have not run yet; yields after each the samples per pixel so far.
 
-        Where the iterator ends, whether it is exhausted or closed, the checkpoint is saved.
+        Where the iterator ends, whether it is exhausted or closed, the checkpoint is saved. Fewer
+        ``paths`` make shorter passes, which take longer together; another iterator may have others.
         """
         if self._checkpoint:
             self._checkpoint.lock()
         try:
-            yield from self._passes()
+            yield from self._passes(paths)
         finally:
             self._save()
             if self._checkpoint:
                 self._checkpoint.unlock()
 
-    def _passes(self) -> Generator[int]:
+    def _passes(self, paths: int | None) -> Generator[int]:
         self._stopping.start()
         start = perf_counter()
         settings = self.settings
         with backend.interrupts_put_off():
-            launcher = self.launcher()
-        plan = plan_passes(settings.pixels, settings.spp, self.spp, growing=self._stopping.may_come)
+            launcher = self.launcher
+        growing = self._stopping.may_come
+        plan = plan_passes(settings.pixels, settings.spp, self.spp, growing=growing, paths=paths)
         self._enough = self.spp > 0 and self._stopping.has_come(
             self.spp, lambda: self.result().error
         )
@@ -173,17 +177,39 @@ class Rendering:
 
         ``row`` counts from the top, ``number`` from 0; raises `ValueError` for one out of range.
         """
+        pixel = self._pixel(column, row)
+        number = check_whole("number", number, 0, self.settings.spp - 1)
+        with backend.interrupts_put_off():
+            sums = self._trace(self.launcher, pixel, range(number, number + 1))
+        return np.asarray(sums.radiance[0, 0])
+
+    def paths(self, column: int, row: int, count: int, first: int = 0) -> Vertices:
+        """Vertices of the paths of ``count`` samples of a pixel, the same that the passes trace.
+
+        What they contribute adds up to the radiance of :meth:`sample`; see
+        :class:`drpt.kernel.recording.Vertices`. Raises `ValueError` for what is out of range.
+        """
+        pixel, spp = self._pixel(column, row), self.settings.spp
+        first = check_whole("first", first, 0, spp - 1)
+        count = check_whole("count", count, 1, spp - first)
+        with backend.interrupts_put_off():
+            launcher = self.launcher
+            from drpt.kernel.launch import prepare
+            from drpt.kernel.recording import record
+
+            primitives, _ = prepare(self.settings.scene.shapes, backend.load())
+            samples = range(first, first + count)
+            return record(launcher, primitives, pixel, samples, self.settings.seed)
+
+    def _pixel(self, column: int, row: int) -> int:
         camera = self.settings.scene.camera
         column = check_whole("column", column, 0, camera.width - 1)
         row = check_whole("row", row, 0, camera.height - 1)
-        number = check_whole("number", number, 0, self.settings.spp - 1)
-        pixel = row * camera.width + column
-        with backend.interrupts_put_off():
-            sums = self._trace(self.launcher(), pixel, range(number, number + 1))
-        return np.asarray(sums.radiance[0, 0])
+        return row * camera.width + column
 
+    @cached_property
     def launcher(self) -> Launcher:
-        """Put the scene on the device."""
+        """The scene on the device, and what it is rendered by."""
         types = backend.load()  # before Dr.Jit is imported, which the kernels do
         from drpt.kernel.launch import make_launcher
 
@@ -441,7 +467,6 @@ def explain(scene: Scene, bounces: int = 3, mode: str = Mode.MIS) -> Explanation
     Raises `ValueError` like :func:`render`.
     """
     rendering = Rendering(scene, bounces=bounces, mode=mode)
-    launcher = rendering.launcher()
     from drpt.kernel.launch import prepare
 
     primitives, _ = prepare(scene.shapes, backend.load())
@@ -450,5 +475,5 @@ def explain(scene: Scene, bounces: int = 3, mode: str = Mode.MIS) -> Explanation
     return Explanation(
         features={name: fact.holds for name, fact in facts.items()},
         reasons={name: fact.reason for name, fact in facts.items()},
-        operations=launcher.operations(),
+        operations=rendering.launcher.operations(),
     )

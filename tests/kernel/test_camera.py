@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.camera import make_camera
+from drpt.kernel.camera import make_camera, picture_plane
 from tests.conftest import TYPES, to_device, to_host
 from tests.oracle.arrays import normalize
 
@@ -41,6 +41,21 @@ def expected(camera: drpt.Camera, column: float, row: float) -> Floats:
     y = half * (1 - 2 * row / camera.height)
     x = half * (2 * column - camera.width) / camera.height
     return normalize(forward + x * right + y * up)
+
+
+def test_points_are_seen_where_rays_to_them_go() -> None:
+    where = np.array([[0, 0], [7, 4], [3.25, 1.5], [-2, 9]])
+    ways = np.array([2.5 * expected(TILTED, *at) for at in where])
+    found = picture_plane(TILTED).project(ways)
+    assert found[:, :2] == pytest.approx(where, abs=1e-12)
+    forward = normalize(np.subtract(TILTED.target, TILTED.eye))
+    assert found[:, 2] == pytest.approx(ways @ forward, rel=1e-12)
+
+
+def test_points_behind_the_eye_are_seen_nowhere() -> None:
+    x, y, depth = picture_plane(TILTED).project(-expected(TILTED, 3, 2)[None])[0]
+    assert np.isnan([x, y]).all()
+    assert depth < 0
 
 
 def test_middle_of_the_picture_looks_at_the_target() -> None:

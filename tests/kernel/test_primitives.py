@@ -78,6 +78,13 @@ def test_order_is_flat_smooth_dull_spheres_lit_spheres_lit_triangles() -> None:
     assert found.smooth_corners.tolist() == [smooth.vertices.tolist()]
     assert found.smooth_normals.tolist() == [[[0, 0, 1]] * 3]
     assert found.light_corners.shape == (2, 3, 3)
+    assert found.shape.tolist() == [4, 2, 3, 1, 0, 0]
+
+
+def test_coincident_lights_are_of_the_first_shape() -> None:
+    lamp = drpt.Sphere((4, 0, 0), 0.5, radiance=1)
+    found = prepare(quad(material=WHITE), lamp, drpt.Sphere((0, 0, 0), 1, radiance=1), lamp)
+    assert found.shape.tolist() == [0, 1, 2]
 
 
 def test_shape_of_no_radiance_is_black() -> None:

@@ -242,7 +242,7 @@ class TestIndependence:
             Sphere((0, 3, 2), 0.5, radiance=5),
         ]
         camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), fov=40, width=4, height=4)
-        launcher = Rendering(Scene(camera, shapes), bounces=1, sampler=name).launcher()
+        launcher = Rendering(Scene(camera, shapes), bounces=1, sampler=name).launcher
         images = [
             launcher.launch(range(16), range(start, start + 64), 64, 0).radiance
             for start in (0, 2**32, 2**33, 2**34)

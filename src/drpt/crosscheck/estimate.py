@@ -68,7 +68,7 @@ def measure(
     ``on_pass`` see :func:`reference`. Raises `ValueError` like it.
     """
     per_pass = check_spp(spp) // PASSES
-    launcher = Rendering(scene, per_pass, bounces, mode, sampler=sampler).launcher()
+    launcher = Rendering(scene, per_pass, bounces, mode, sampler=sampler).launcher
     pixels = range(scene.camera.width * scene.camera.height)
     at_once = max(1, LAUNCH_PATHS // (len(pixels) * per_pass))
 

@@ -44,8 +44,28 @@ class DeviceCamera:
         return Ray(self.eye, dr.normalize(through))
 
 
-def make_camera(camera: Camera, origin: NDArray[np.float64], types: ModuleType) -> DeviceCamera:
-    """Put a camera on the device, relative to ``origin``; all of it are inputs of the kernel."""
+class PicturePlane(NamedTuple):
+    """The picture at distance 1 before the eye: its top left corner and a pixel's two edges.
+
+    Vectors (3,) from the eye; a pixel (x, y) is seen along corner + x right + y down.
+    """
+
+    corner: NDArray[np.float64]
+    right: NDArray[np.float64]
+    down: NDArray[np.float64]
+
+    def project(self, ways: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where vectors (n, 3) from the eye meet the picture: (x, y) in pixels and depth, (n, 3).
+
+        ``x`` and ``y`` count from the top left corner; they are not a number behind the eye.
+        """
+        depth, x, y = np.linalg.solve(np.stack(self, axis=1), ways.T)
+        ahead = np.where(depth > 0, depth, np.nan)
+        return np.stack([x / ahead, y / ahead, depth], axis=1)
+
+
+def picture_plane(camera: Camera) -> PicturePlane:
+    """Return the plane of a camera's picture, in float64."""
     eye, target, up = map(np.array, (camera.eye, camera.target, camera.up))
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, up)
@@ -53,14 +73,20 @@ def make_camera(camera: Camera, origin: NDArray[np.float64], types: ModuleType) 
     down = np.cross(forward, right)
     pixel = 2 * tan(radians(camera.fov) / 2) / camera.height
     corner = forward - pixel / 2 * (camera.width * right + camera.height * down)
+    return PicturePlane(corner, pixel * right, pixel * down)
+
+
+def make_camera(camera: Camera, origin: NDArray[np.float64], types: ModuleType) -> DeviceCamera:
+    """Put a camera on the device, relative to ``origin``; all of it are inputs of the kernel."""
+    plane = picture_plane(camera)
 
     def vector(v: NDArray[np.float64]) -> Array3f:
         return types.Array3f(*(dr.opaque(types.Float32, float(x)) for x in v))
 
     return DeviceCamera(
-        eye=vector(eye - origin),
-        corner=vector(corner),
-        right=vector(pixel * right),
-        down=vector(pixel * down),
+        eye=vector(camera.eye - origin),
+        corner=vector(plane.corner),
+        right=vector(plane.right),
+        down=vector(plane.down),
         width=dr.opaque(types.UInt32, camera.width),
     )

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.estimator import Mode
+    from drpt.kernel.path import Path
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Scene, Shape
@@ -45,6 +46,18 @@ class Sums(NamedTuple):
     radiance: NDArray[np.float64]
     rays: int
     non_finite: int
+
+
+class SinglePaths(NamedTuple):
+    """Paths along camera rays, a lane each.
+
+    ``shared`` decides about their first vertex, where several of them may share a ray; ``own``
+    about where they go on from there.
+    """
+
+    path: Path
+    shared: Sampler
+    own: Sampler
 
 
 @dataclass
@@ -80,6 +93,15 @@ class Launcher:
         work = self._work(pixels, samples, len(samples), _seed_word(seed) + passes.start)
         return self._launch(work, len(passes))
 
+    def single_paths(self, pixel: int, samples: range, seed: int) -> SinglePaths:
+        """The same paths as :meth:`launch` traces of a pixel, before their first vertex."""
+        work = self._work(range(pixel, pixel + 1), samples, 1, _word_of(seed, samples))
+        lanes = self._lanes(work._replace(sharing=len(samples)), len(samples))
+        number = lanes.work.first_ray * lanes.work.paths + lanes.work.skipped
+        number += dr.arange(type(number), len(samples))
+        own, shared = lanes.sampler_at(number), lanes.sampler_at(number // lanes.work.paths)
+        return SinglePaths(self.tracer.start(lanes.camera_ray(shared)), shared, own)
+
     def _work(self, pixels: range, samples: range, run: int, seed_word: int) -> Work:
         start, paths = samples.start & 0xFFFFFFFF, self.paths_per_ray
         stop = start % paths + len(samples)
@@ -100,23 +122,24 @@ class Launcher:
         """Trace with so many lanes for each pixel; ``radiance`` is (lanes, pixels, 3)."""
         if not self.tracer.features.emission:
             return Sums(np.zeros((lanes, work.pixels, 3)), 0, 0)
-        index = self.tracer.scene.types.UInt32
-        totals = self._trace(
-            Lanes(
-                self.tracer,
-                self.camera,
-                self.sampler,
-                jitter=self.jitter,
-                lane=dr.arange(index, work.pixels * lanes),
-                work=Work(*(dr.opaque(index, n) for n in work)),
-            )
-        )
+        totals = self._trace(self._lanes(work, lanes))
         with flush_denormals():
             dr.eval(*totals)
             dr.sync_thread()
         by_lane = np.stack([np.array(channel) for channel in totals.radiance], axis=-1)
         by_pixel = by_lane.reshape(lanes, work.pixels, 3)
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
+
+    def _lanes(self, work: Work, lanes: int) -> Lanes:
+        index = self.tracer.scene.types.UInt32
+        return Lanes(
+            self.tracer,
+            self.camera,
+            self.sampler,
+            jitter=self.jitter,
+            lane=dr.arange(index, work.pixels * lanes),
+            work=Work(*(dr.opaque(index, n) for n in work)),
+        )
 
     def _trace(self, lanes: Lanes) -> Totals:
         if self.tracer.features.shared_rays and self.sampler is SobolSampler:

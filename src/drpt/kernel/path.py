@@ -26,6 +26,7 @@ from drpt.kernel.brdf import Brdf, make_brdf
 from drpt.kernel.camera import Ray
 from drpt.kernel.intersect import Hit, closest_hit, occluded
 from drpt.kernel.light import (
+    LightSample,
     Receiver,
     choose_light,
     inverse_pdf,
@@ -79,7 +80,7 @@ class Tracer:
 
     def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
         """What camera rays meet, and the light that it sends."""
-        return self._arrive(self.start(ray), sampler, 0)
+        return self.arrive(self.start(ray), sampler, 0)
 
     def start(self, ray: Ray) -> Path:
         """Paths along camera rays, which no light sample finds: their density is infinite."""
@@ -99,7 +100,7 @@ class Tracer:
         """Radiance (W/(m² sr), three channels) of whole paths on from a first vertex, and rays."""
         if self.vertices <= 1:
             return first.path.radiance, first.path.rays
-        path = self._leave(first, sampler, 0)
+        path = self.leave(first, sampler, 0)
         unrolled = min(self.vertices, UNROLLED_VERTICES)
         for depth in range(1, unrolled):
             path = self.step(path, sampler, depth)
@@ -128,11 +129,11 @@ class Tracer:
 
     def step(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Path:
         """Follow paths over their vertex number ``depth``; they are active if there is a next."""
-        vertex = self._arrive(path, sampler, depth)
+        vertex = self.arrive(path, sampler, depth)
         is_last = isinstance(depth, int) and depth == self.vertices - 1
-        return vertex.path if is_last else self._leave(vertex, sampler, depth)
+        return vertex.path if is_last else self.leave(vertex, sampler, depth)
 
-    def _arrive(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Vertex:
+    def arrive(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Vertex:
         """Find the next vertex, and collect the light that it sends."""
         scene, features = self.scene, self.features
         ray = Ray(path.origin, path.direction)
@@ -153,7 +154,7 @@ class Tracer:
             rays = rays + dr.select(traced, 1, 0)
         return Vertex(path._replace(radiance=radiance, rays=rays), hit, brdf)
 
-    def _leave(self, vertex: Vertex, sampler: Sampler, depth: int | UInt32) -> Path:
+    def leave(self, vertex: Vertex, sampler: Sampler, depth: int | UInt32) -> Path:
         """Choose where a path goes on."""
         path, hit, brdf = vertex
         direction, weight = self._next_direction(brdf, sampler, depth)
@@ -184,19 +185,24 @@ class Tracer:
         self, hit: Hit, brdf: Brdf, sampler: Sampler, depth: int | UInt32
     ) -> tuple[Array3f, Bool]:
         """Direct light by one sample of one light, and where that took a shadow ray."""
-        scene, features = self.scene, self.features
-        at = Receiver(hit.point, hit.shading_normal)
-        number = lambda: sampler.next_1d(_decision(depth, 0))  # noqa: E731
-        choice = choose_light(scene, at, hit.valid, number)
-        u = sampler.next_2d(_decision(depth, 1))
-        sample = sample_light(scene, features, self.mode, at, choice, u)
+        light, sample = self.light_sample(hit, sampler, depth)
         value = brdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
-        if features.mis:
+        if self.features.mis:
             value *= power_heuristic(brdf.pdf(sample.direction) * sample.inverse_pdf)
         traced = hit.valid & ~(dr.max(value) <= 0)
         ray = Ray(hit.point, sample.direction)
-        shadow = occluded(scene, ray, sample.distance, choice.light, traced)
+        shadow = occluded(self.scene, ray, sample.distance, light, traced)
         return dr.select(traced & ~shadow, value, 0), traced
+
+    def light_sample(
+        self, hit: Hit, sampler: Sampler, depth: int | UInt32
+    ) -> tuple[UInt32, LightSample]:
+        """The number of the light that a vertex looks at, and the sampled point of it."""
+        at = Receiver(hit.point, hit.shading_normal)
+        number = lambda: sampler.next_1d(_decision(depth, 0))  # noqa: E731
+        choice = choose_light(self.scene, at, hit.valid, number)
+        u = sampler.next_2d(_decision(depth, 1))
+        return choice.light, sample_light(self.scene, self.features, self.mode, at, choice, u)
 
     def _next_direction(
         self, brdf: Brdf, sampler: Sampler, depth: int | UInt32

@@ -63,6 +63,8 @@ class Primitives:
         Row (albedo, exponent) of each primitive that reflects.
     radiance
         Of each light (n, 3).
+    shape
+        Number of each primitive's shape in the scene; of coincident lights, the first's.
     """
 
     origin: Array
@@ -77,6 +79,7 @@ class Primitives:
     sphere_lights: int
     reflectance: Array
     radiance: Array
+    shape: NDArray[np.intp]
 
     @property
     def first_sphere(self) -> int:
@@ -147,19 +150,17 @@ class Primitives:
 def make_primitives(shapes: tuple[Shape, ...]) -> Primitives:
     """Primitives of the shapes of a scene."""
     origin = _origin(shapes)
-    meshes = [shape for shape in shapes if isinstance(shape, Mesh)]
-    spheres = [shape for shape in shapes if isinstance(shape, Sphere)]
-    flat = [_part(m, origin) for m in meshes if not m.is_light and m.normals is None]
-    smooth = [_part(m, origin) for m in meshes if not m.is_light and m.normals is not None]
-    dull_spheres = [_Part(s, _row(s, origin)) for s in spheres if not s.is_light]
-    light_corners, triangle_radiance = _lights(
-        [_part(m, origin) for m in meshes if m.is_light], 3, 3
-    )
-    light_spheres, sphere_radiance = _lights(
-        [_Part(s, _row(s, origin)) for s in spheres if s.is_light], 4
-    )
-    flat, facets = _unrolled(flat, smooth)
+    parts = [_part(number, shape, origin) for number, shape in enumerate(shapes)]
+    dull = [part for part in parts if not part.shape.is_light]
+    meshes = [part for part in dull if isinstance(part.shape, Mesh)]
+    smooth = [part for part in meshes if len(part.normals)]
+    spheres = [part for part in dull if isinstance(part.shape, Sphere)]
+    flat, facets = _unrolled([part for part in meshes if not len(part.normals)], smooth)
+    lit = [part for part in parts if part.shape.is_light]
+    lit_spheres = _lights([part for part in lit if isinstance(part.shape, Sphere)], 4)
+    lit_triangles = _lights([part for part in lit if isinstance(part.shape, Mesh)], 3, 3)
     corners = np.concatenate([np.empty((0, 3, 3)), *map(_triangles, (*flat, *smooth))])
+    light_corners = lit_triangles.primitives
     few_lights = len(light_corners) <= UNROLL_LIMIT
     return Primitives(
         origin=origin,
@@ -170,10 +171,13 @@ def make_primitives(shapes: tuple[Shape, ...]) -> Primitives:
         smooth_corners=_joined(smooth, 3, 3),
         smooth_normals=np.concatenate([np.empty((0, 3, 3)), *(part.normals for part in smooth)]),
         light_corners=light_corners,
-        spheres=np.concatenate([_joined(dull_spheres, 4), light_spheres]),
-        sphere_lights=len(light_spheres),
-        reflectance=_rows([*flat, *smooth, *dull_spheres], _reflectance, 4),
-        radiance=np.concatenate([sphere_radiance, triangle_radiance]),
+        spheres=np.concatenate([_joined(spheres, 4), lit_spheres.primitives]),
+        sphere_lights=len(lit_spheres.primitives),
+        reflectance=_rows([*flat, *smooth, *spheres], _reflectance, 4),
+        radiance=np.concatenate([lit_spheres.radiance, lit_triangles.radiance]),
+        shape=np.concatenate(
+            [_numbers([*flat, *smooth, *spheres]), lit_spheres.shape, lit_triangles.shape]
+        ),
     )
 
 
@@ -184,17 +188,28 @@ class _Part(NamedTuple):
     or a list of outlines (k, 3), once they are merged.
     """
 
+    number: int
     shape: Shape
     primitives: Array | list[Array]
     normals: Array = np.empty((0, 3, 3))
 
 
-def _part(mesh: Mesh, origin: Array) -> _Part:
-    corners = mesh.vertices[mesh.faces] - origin
+class _Lights(NamedTuple):
+    """Primitives of one kind that emit, their radiance (n, 3), and the numbers of their shapes."""
+
+    primitives: Array
+    radiance: Array
+    shape: NDArray[np.intp]
+
+
+def _part(number: int, shape: Shape, origin: Array) -> _Part:
+    if isinstance(shape, Sphere):
+        return _Part(number, shape, np.array([[*(shape.center - origin), shape.radius]]))
+    corners = shape.vertices[shape.faces] - origin
     kept = has_area(corners)
-    if mesh.normals is None:
-        return _Part(mesh, corners[kept])
-    return _Part(mesh, corners[kept], mesh.normals[mesh.faces[kept]])
+    if shape.normals is None or shape.is_light:
+        return _Part(number, shape, corners[kept])
+    return _Part(number, shape, corners[kept], shape.normals[shape.faces[kept]])
 
 
 def _unrolled(flat: list[_Part], smooth: list[_Part]) -> tuple[list[_Part], tuple[Facet, ...]]:
@@ -208,15 +223,16 @@ def _unrolled(flat: list[_Part], smooth: list[_Part]) -> tuple[list[_Part], tupl
     return merged, tuple(map(make_facet, polygons))
 
 
-def _lights(parts: list[_Part], *shape: int) -> tuple[Array, Array]:
-    """Primitives (n, *shape) that emit, and their radiance (n, 3): the sum of coincident ones."""
+def _lights(parts: list[_Part], *shape: int) -> _Lights:
+    """Primitives (n, *shape) that emit; coincident ones are one, with the sum of their radiance."""
     primitives = _joined(parts, *shape)
     radiance = _rows(parts, lambda shape: shape.radiance or (), 3)
     first, owner = _coincident(primitives.reshape(-1, *(shape if len(shape) > 1 else (1, *shape))))
     total = np.zeros((len(first), 3))
     np.add.at(total, owner, radiance)
     order = np.argsort(first)
-    return primitives[first[order]], total[order]
+    kept = first[order]
+    return _Lights(primitives[kept], total[order], _numbers(parts)[kept])
 
 
 def _coincident(corners: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -231,10 +247,6 @@ def _coincident(corners: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     turned = np.take_along_axis(points, turns, axis=1)
     _, first, group = np.unique(turned, axis=0, return_index=True, return_inverse=True)
     return first, group.reshape(-1)
-
-
-def _row(sphere: Sphere, origin: Array) -> Array:
-    return np.array([[*(sphere.center - origin), sphere.radius]])
 
 
 def _reflectance(shape: Shape) -> tuple[float, ...]:
@@ -259,6 +271,12 @@ def _rows(parts: list[_Part], row: Callable[[Shape], tuple[float, ...]], width: 
     """The row of each part's shape, once for each of its primitives, (n, width)."""
     rows = np.array([row(part.shape) for part in parts]).reshape(-1, width)
     return np.repeat(rows, [len(part.primitives) for part in parts], axis=0)
+
+
+def _numbers(parts: list[_Part]) -> NDArray[np.intp]:
+    """The number of each part's shape, once for each of its primitives."""
+    numbers = np.array([part.number for part in parts], np.intp)
+    return np.repeat(numbers, [len(part.primitives) for part in parts])
 
 
 def _planes(corners: Array) -> Array:

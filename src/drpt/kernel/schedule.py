@@ -87,8 +87,8 @@ class Lanes:
         first_sample = self.work.first_ray
 
         def add_path(sample: UInt32, *totals: Any) -> tuple[Any, ...]:
-            sampler = self._sampler(first_sample + sample)
-            first = self.tracer.first_vertex(self._camera_ray(sampler), sampler)
+            sampler = self.sampler_at(first_sample + sample)
+            first = self.tracer.first_vertex(self.camera_ray(sampler), sampler)
             traced = self.tracer.follow(first, sampler)
             return sample + 1, *Totals(*totals).plus(*traced)
 
@@ -100,14 +100,14 @@ class Lanes:
         first_sample = work.first_ray * work.paths
 
         def add_ray(ray: UInt32, *totals: Any) -> tuple[Any, ...]:
-            sampler = self._sampler(work.first_ray + ray)
-            first = self.tracer.first_vertex(self._camera_ray(sampler), sampler)
+            sampler = self.sampler_at(work.first_ray + ray)
+            first = self.tracer.first_vertex(self.camera_ray(sampler), sampler)
             once = Totals(*totals)
             once = once._replace(rays=once.rays + first.path.rays)
             first = first._replace(path=first.path._replace(rays=self.types.UInt32(0)))
 
             def add_path(sample: UInt32, *totals: Any) -> tuple[Any, ...]:
-                traced = self.tracer.follow(first, self._sampler(first_sample + sample))
+                traced = self.tracer.follow(first, self.sampler_at(first_sample + sample))
                 return sample + 1, *Totals(*totals).plus(*traced)
 
             begin = dr.maximum(ray * work.paths, work.skipped)
@@ -128,9 +128,9 @@ class Lanes:
         first_sample = self.work.first_ray
 
         def add_vertex(sample: UInt32, depth: UInt32, *state: Any) -> tuple[Any, ...]:
-            sampler = self._sampler(first_sample + sample)
+            sampler = self.sampler_at(first_sample + sample)
             path, totals = Path(*state[:fields]), Totals(*state[fields:])
-            fresh = tracer.start(self._camera_ray(sampler))
+            fresh = tracer.start(self.camera_ray(sampler))
             now: list[Any] = [
                 dr.select(depth == 0, *pair) for pair in zip(fresh, path, strict=True)
             ]
@@ -144,7 +144,7 @@ class Lanes:
             sample = sample + dr.select(ends, self.types.UInt32(1), 0)
             return sample, dr.select(ends, 0, depth + 1), *path, *totals
 
-        any_path = tracer.start(self._camera_ray(self._sampler(self.first)))
+        any_path = tracer.start(self.camera_ray(self.sampler_at(self.first)))
         zero = dr.zeros(self.types.UInt32, self.count)
         sums = self._loop(add_vertex, lambda sample, *_: sample < self.last, zero, *any_path)
         return Totals(*sums[-3:])
@@ -159,10 +159,12 @@ class Lanes:
         start: tuple[Any, ...] = (self.first, *state, *zeros)
         return dr.while_loop(start, goes_on, body)[1:]
 
-    def _sampler(self, index: UInt32) -> Sampler:
+    def sampler_at(self, index: UInt32) -> Sampler:
+        """The sampler of a sample, or of a camera ray, of each lane's pixel."""
         return self.sampler(self.pixel, index, self.seed)
 
-    def _camera_ray(self, sampler: Sampler) -> Ray:
+    def camera_ray(self, sampler: Sampler) -> Ray:
+        """A ray through each lane's pixel."""
         middle = self.types.Float32(0.5)
         offset = sampler.next_2d(0) if self.jitter else vec2(middle, middle)
         return self.camera.ray(self.pixel, offset)

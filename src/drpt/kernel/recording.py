@@ -1,0 +1,147 @@
+"""Single paths, vertex by vertex: where they went, and which of the light each vertex found.
+
+The tracer is that of the renders; here it stops at every vertex and says what it has there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import drjit as dr
+import numpy as np
+
+from drpt.kernel.camera import Ray
+from drpt.kernel.intersect import closest_hit
+
+if TYPE_CHECKING:
+    from drjit.auto import Array3f, Bool, UInt32
+    from numpy.typing import NDArray
+
+    from drpt.kernel.launch import Launcher
+    from drpt.kernel.path import Path, Tracer, Vertex
+    from drpt.kernel.primitives import Primitives
+    from drpt.kernel.sampler import Sampler
+
+NONE = -1
+"""Stands for the number of a shape where there is none."""
+
+
+class Vertices(NamedTuple):
+    """The vertices of some paths: arrays (depths, paths) and (depths, paths, 3).
+
+    Attributes
+    ----------
+    reached
+        Whether a ray was sent to the vertex; all else says nothing where none was.
+    throughput
+        What share of the radiance from there arrives in the picture.
+    direction
+        Unit vector along which the ray came.
+    shape
+        Number in the scene of the shape that the ray met, `NONE` for the background.
+    point
+        Where that is, in world space.
+    contribution
+        Radiance that the vertex adds to that of its path, W/(m² sr): emission of a light, direct
+        light of a surface.
+    light_shape
+        Number of the shape to which a shadow ray was sent, or `NONE`; it arrived if there is a
+        contribution.
+    light_point
+        The point of it, in world space.
+    """
+
+    reached: NDArray[np.bool_]
+    throughput: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    shape: NDArray[np.intp]
+    point: NDArray[np.float64]
+    contribution: NDArray[np.float64]
+    light_shape: NDArray[np.intp]
+    light_point: NDArray[np.float64]
+
+
+def record(
+    launcher: Launcher, primitives: Primitives, pixel: int, samples: range, seed: int
+) -> Vertices:
+    """Trace samples of a pixel as a render traces them, and keep their vertices.
+
+    ``primitives`` are those that the launcher has on the device.
+    """
+    tracer, recorder = launcher.tracer, _Recorder(launcher.tracer, primitives)
+    path, sampler, own = launcher.single_paths(pixel, samples, seed)
+    path = path._replace(
+        active=dr.full(tracer.scene.types.Bool, True, len(samples)),
+        beta=dr.full(tracer.scene.types.Array3f, 1, len(samples)),
+    )
+    dr.make_opaque(*path)
+    found = []
+    for depth in range(tracer.vertices):
+        number = dr.opaque(tracer.scene.types.UInt32, depth)  # one kernel for every depth
+        vertices, path = recorder.step(path, sampler, own, number)
+        found.append(vertices)
+        sampler = own
+    return Vertices(*map(np.stack, zip(*found, strict=True))) if found else _none(len(samples))
+
+
+@dataclass
+class _Recorder:
+    """Follows paths over one vertex after the other."""
+
+    tracer: Tracer
+    primitives: Primitives
+
+    def step(
+        self, path: Path, sampler: Sampler, own: Sampler, depth: UInt32
+    ) -> tuple[Vertices, Path]:
+        """Return what is at the next vertex, and the paths on from there."""
+        tracer, types = self.tracer, self.tracer.scene.types
+        fresh = path._replace(radiance=types.Array3f(0), rays=types.UInt32(0))
+        vertex = tracer.arrive(fresh, sampler, depth)
+        onward = tracer.leave(vertex, own, depth)
+        ray = Ray(path.origin, path.direction)
+        hit = closest_hit(tracer.scene, tracer.features, ray, path.active)
+        light, light_point = self._light(vertex, sampler, depth)
+        looked = vertex.path.rays > 1
+        dr.eval(
+            hit.valid, hit.primitive, hit.point, *vertex.path, looked, light, light_point, *onward
+        )
+        vertices = Vertices(
+            reached=np.array(path.active),
+            throughput=_rows(path.beta),
+            direction=_rows(path.direction),
+            shape=self._shapes(hit.primitive, hit.valid),
+            point=self.primitives.origin + _rows(hit.point),
+            contribution=_rows(vertex.path.radiance),
+            light_shape=self._shapes(light, looked),
+            light_point=self.primitives.origin + _rows(light_point),
+        )
+        return vertices, onward
+
+    def _light(self, vertex: Vertex, sampler: Sampler, depth: UInt32) -> tuple[UInt32, Array3f]:
+        """The primitive and the point that a vertex looks at, if it looks at any."""
+        hit = vertex.hit
+        if not self.tracer.features.direct_light:
+            return hit.primitive, hit.point
+        light, sample = self.tracer.light_sample(hit, sampler, depth)
+        point = dr.fma(sample.direction, sample.distance, hit.point)
+        return light + self.tracer.scene.first_light, point
+
+    def _shapes(self, primitive: UInt32, valid: Bool) -> NDArray[np.intp]:
+        kept = np.array(valid)
+        return np.where(kept, self.primitives.shape[np.where(kept, np.array(primitive), 0)], NONE)
+
+
+def _none(paths: int) -> Vertices:
+    """No vertices at all, of a scene without light."""
+    flags, numbers, vectors = (
+        np.empty((0, paths), bool),
+        np.empty((0, paths), np.intp),
+        np.empty((0, paths, 3)),
+    )
+    return Vertices(flags, vectors, vectors, numbers, vectors, vectors, numbers, vectors)
+
+
+def _rows(vectors: Array3f) -> NDArray[np.float64]:
+    return np.array(vectors, np.float64).T
