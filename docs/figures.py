@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -51,7 +50,7 @@ def picture(scene: Scene, spp: int, bounces: int, mode: Mode) -> Image.Image:
     """Render a scene at the height of a strip."""
     camera = scene.camera
     width = round(camera.width * HEIGHT / camera.height)
-    resized = replace(scene, camera=replace(camera, width=width, height=HEIGHT))
+    resized = scene.resized(width, HEIGHT)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "picture.png"
         render(resized, spp, bounces, mode).save(path)

@@ -36,8 +36,8 @@ class Settings:
             "scene": _check_scene(self.scene),
             "spp": check_whole("spp", self.spp, 1, MAX_SPP),
             "bounces": check_whole("bounces", self.bounces, 0, MAX_BOUNCES),
-            "mode": _check_mode(self.mode),
-            "sampler": _check_choice("sampler", self.sampler, SAMPLERS),
+            "mode": check_mode(self.mode),
+            "sampler": check_choice("sampler", self.sampler, SAMPLERS),
             "seed": check_whole("seed", self.seed, 0, None),
             "jitter": check_switch("jitter", self.jitter),
         }
@@ -61,6 +61,14 @@ def check_whole(name: str, value: object, low: int, high: int | None) -> int:
     return int(value)
 
 
+def check_number(name: str, value: object, low: float, high: float) -> float:
+    """Return a number in a range, or raise `ValueError`."""
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else np.nan
+    if not low <= number <= high:
+        raise refuse(name, value, f"a number from {low:g} to {high:g}")
+    return number
+
+
 def check_positive(name: str, value: object) -> float:
     """Return a finite number above 0, or raise `ValueError`."""
     if isinstance(value, bool) or not isinstance(value, Real):
@@ -69,6 +77,21 @@ def check_positive(name: str, value: object) -> float:
     if not 0 < number < np.inf:
         raise refuse(name, value, "a finite number > 0")
     return number
+
+
+def check_mode(mode: object) -> Mode:
+    """Return a mode, given by itself or by its name, or raise `ValueError`."""
+    if isinstance(mode, str):
+        with suppress(ValueError):
+            return Mode(mode)
+    raise refuse("mode", mode, f"one of {', '.join(Mode)}")
+
+
+def check_choice(name: str, value: object, choices: tuple[str, ...]) -> str:
+    """Return one of some texts, or raise `ValueError`."""
+    if not isinstance(value, str) or value not in choices:
+        raise refuse(name, value, f"one of {', '.join(choices)}")
+    return value
 
 
 def check_switch(name: str, value: object) -> bool:
@@ -87,16 +110,3 @@ def _check_scene(scene: object) -> Scene:
     if not isinstance(scene, Scene):
         raise refuse("scene", scene, "a drpt.Scene, as drpt.load_scene returns it")
     return scene
-
-
-def _check_mode(mode: object) -> Mode:
-    if isinstance(mode, str):
-        with suppress(ValueError):
-            return Mode(mode)
-    raise refuse("mode", mode, f"one of {', '.join(Mode)}")
-
-
-def _check_choice(name: str, value: object, choices: tuple[str, ...]) -> str:
-    if not isinstance(value, str) or value not in choices:
-        raise refuse(name, value, f"one of {', '.join(choices)}")
-    return value

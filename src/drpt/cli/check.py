@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drpt.cli.parser import add_sampling, add_scene, add_size, add_transport, resized
+from drpt.cli.parser import add_sampling, add_scene, add_size, add_transport
 from drpt.cli.status import FAILED, bad_input
 from drpt.crosscheck.check import Verdict, check
 from drpt.crosscheck.estimate import PASSES, check_spp
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     folder: Path = args.output or Path(f"{Path(args.scene).stem}-check")
     reference = None
     with bad_input(args.parser):
-        scene = resized(load_scene(args.scene), args.width, args.height)
+        scene = load_scene(args.scene).resized(args.width, args.height)
         for mode in modes:
             settings = {"sampler": args.sampler, "seed": args.seed}
             Rendering(scene, check_spp(args.spp), bounces, mode, **settings)

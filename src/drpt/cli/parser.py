@@ -6,7 +6,6 @@ import argparse
 import re
 import sys
 from contextlib import suppress
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import drpt
@@ -15,8 +14,6 @@ from drpt.render import SAMPLERS, Mode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from drpt.scene import Scene
 
     Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
@@ -84,17 +81,9 @@ def add_scene(parser: Parser) -> None:
 
 
 def add_size(group: argparse._ActionsContainer) -> None:
-    """Add ``--width`` and ``--height``; see `resized`."""
+    """Add ``--width`` and ``--height``; see `drpt.Scene.resized`."""
     group.add_argument("--width", metavar="N", type=integer, help="pixels (default: the scene's)")
     group.add_argument("--height", metavar="N", type=integer, help="pixels (default: the scene's)")
-
-
-def resized(scene: Scene, width: int | None, height: int | None) -> Scene:
-    """Return a scene whose camera has the size that was asked for, or its own."""
-    camera = scene.camera
-    width = camera.width if width is None else width
-    height = camera.height if height is None else height
-    return replace(scene, camera=replace(camera, width=width, height=height))
 
 
 def add_display(group: argparse._ActionsContainer) -> None:

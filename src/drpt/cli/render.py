@@ -22,7 +22,6 @@ from drpt.cli.parser import (
     add_transport,
     add_version,
     number,
-    resized,
     thread_count,
 )
 from drpt.cli.status import FAILED, STATUSES, TERMINATED, bad_input, drop_stdout, say
@@ -185,7 +184,7 @@ def _check_files(args: argparse.Namespace, outputs: list[Path]) -> None:
 
 def _rendering(args: argparse.Namespace) -> Rendering:
     return Rendering(
-        resized(load_scene(args.scene), args.width, args.height),
+        load_scene(args.scene).resized(args.width, args.height),
         args.spp,
         args.bounces,
         args.mode,

@@ -6,7 +6,7 @@ Lengths have no unit of their own, colours are linear RGB.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -306,6 +306,13 @@ class Scene:
         if not isinstance(description, str):
             raise checks.refuse("description", description, "a text")
         _set(self, camera=camera, shapes=_shapes(shapes), description=description)
+
+    def resized(self, width: int | None = None, height: int | None = None) -> Scene:
+        """Return the same scene in a picture of so many pixels; None leaves a side as it is."""
+        camera = self.camera
+        width = camera.width if width is None else width
+        height = camera.height if height is None else height
+        return replace(self, camera=replace(camera, width=width, height=height))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a TOML scene file, and its meshes into a folder beside it.

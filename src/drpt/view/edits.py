@@ -1,0 +1,103 @@
+"""Scenes as a browser changes them: lights, surfaces, and the camera's place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from drpt.scene import Camera, Diffuse, Mesh, Phong, Scene, SceneError, Sphere
+from drpt.scene.checks import refuse
+from drpt.view.state import Orbit
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from drpt.scene import Shape
+    from drpt.scene.model import Material
+
+OF_SPHERES = ("center", "radius")
+OF_SURFACES = ("albedo", "exponent")
+NEAR = 1e-3
+"""The camera goes around a point that is farther away than this, relative to the scene's size."""
+
+
+def edited(scene: Scene, edits: Mapping[int, Mapping[str, Any]], orbit: Orbit) -> Scene:
+    """Return a scene with some shapes changed, seen from where the camera has gone.
+
+    An edit may have ``center`` and ``radius`` of a sphere, ``albedo`` and ``exponent`` of what
+    reflects (None makes it diffuse). A light whose radius changes keeps its power. Raises
+    `SceneError`, which names the field.
+    """
+    shapes = list(scene.shapes)
+    for number, edit in edits.items():
+        field = f"edits[{number}]"
+        if number >= len(shapes):
+            raise SceneError(f"there are {len(shapes)} shapes, counted from 0", field)
+        try:
+            shapes[number] = _changed(shapes[number], edit)
+        except SceneError as error:
+            raise error.within(field) from None
+    return replace(scene, shapes=tuple(shapes), camera=moved(scene, orbit))
+
+
+def _changed(shape: Shape, edit: Mapping[str, Any]) -> Shape:
+    allowed = OF_SPHERES * isinstance(shape, Sphere) + OF_SURFACES * (shape.material is not None)
+    for name in edit:
+        if name not in allowed:
+            raise refuse("", name, f"one of {', '.join(allowed)}" if allowed else "left out")
+    geometry = {name: edit[name] for name in OF_SPHERES if name in edit}
+    changed = replace(shape, **geometry) if geometry else shape
+    if isinstance(changed, Sphere) and isinstance(shape, Sphere) and shape.radiance is not None:
+        radiance = np.multiply(shape.radiance, (shape.radius / changed.radius) ** 2)
+        return Sphere(changed.center, changed.radius, radiance=radiance)
+    if changed.material is not None and edit.keys() & set(OF_SURFACES):
+        return replace(changed, material=_material(changed.material, edit))
+    return changed
+
+
+def _material(material: Material, edit: Mapping[str, Any]) -> Material:
+    albedo = edit.get("albedo", material.albedo)
+    exponent = edit.get("exponent", getattr(material, "exponent", None))
+    return Diffuse(albedo) if exponent is None else Phong(albedo, exponent)
+
+
+def moved(scene: Scene, orbit: Orbit) -> Camera:
+    """Return the camera after it has gone around what it looks at."""
+    camera = scene.camera
+    if orbit == Orbit():
+        return camera
+    eye, up = np.array(camera.eye), np.array(camera.up)
+    forward = np.subtract(camera.target, eye)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    pivot = eye + forward * _depth(scene, forward)
+    around = Rotation.from_rotvec(orbit.azimuth * up / np.linalg.norm(up), degrees=True)
+    over = Rotation.from_rotvec(-orbit.elevation * right, degrees=True)
+    turn = around * over
+    there = pivot + turn.apply(eye - pivot) * 2.0**-orbit.zoom
+    return replace(camera, eye=there, target=pivot, up=turn.apply(up))
+
+
+def _depth(scene: Scene, forward: NDArray[np.float64]) -> float:
+    """How far ahead of the eye the middle of the scene is, if it is ahead."""
+    low, high = bounding_box(scene)
+    depth = float(((low + high) / 2 - scene.camera.eye) @ forward)
+    return max(depth, NEAR * float(np.linalg.norm(high - low)))
+
+
+def bounding_box(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and the greatest corner (3,) of a box around all shapes."""
+    boxes = np.array([_box(shape) for shape in scene.shapes])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def _box(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    if isinstance(shape, Mesh):
+        return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+    return np.subtract(shape.center, shape.radius), np.add(shape.center, shape.radius)

@@ -1,0 +1,93 @@
+"""The render thread, which serves all sessions in turn."""
+
+from __future__ import annotations
+
+from collections import deque
+from threading import Condition, Thread
+from typing import TYPE_CHECKING
+
+from drpt.kernel import backend
+from drpt.view.scenes import Scenes
+from drpt.view.session import Session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+MAX_SESSIONS = 32
+"""Each of them may hold some 20 MB of pictures."""
+
+
+class TooManySessions(RuntimeError):  # noqa: N818 -- it says what is wrong
+    """No more browsers are served."""
+
+
+class Worker:
+    """Renders what sessions show, a step of one after a step of another.
+
+    Parameters
+    ----------
+    scene_name
+        Name of a built-in scene, or path of a scene file.
+    width, height
+        Size of the pictures in pixels; None for the scene's own.
+
+    Raises `SceneError`, which names the file and the field.
+    """
+
+    def __init__(
+        self, scene_name: str, *, width: int | None = None, height: int | None = None
+    ) -> None:
+        self._scenes = Scenes(scene_name, width, height)
+        self._sessions: deque[Session] = deque()
+        self._change = Condition()
+        self._stopping = False
+        self._thread = Thread(target=self._run, name="render")
+
+    def start(self) -> None:
+        """Start to render; raises `drpt.kernel.backend.BackendError` where nothing can."""
+        backend.load()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop after the step that is running."""
+        with self._change:
+            self._stopping = True
+            self._change.notify()
+        self._thread.join()
+
+    def open(self, ready: Callable[[], None]) -> Session:
+        """Return a new session, which calls ``ready`` when it has something to send.
+
+        Raises `TooManySessions`.
+        """
+        session = Session(self._scenes, ready, self._wake)
+        with self._change:
+            if len(self._sessions) == MAX_SESSIONS:
+                raise TooManySessions(f"{MAX_SESSIONS} viewers at most")
+            self._sessions.append(session)
+        return session
+
+    def close(self, session: Session) -> None:
+        """Forget a session, if it is there."""
+        with self._change:
+            if session in self._sessions:
+                self._sessions.remove(session)
+
+    def _wake(self) -> None:
+        with self._change:
+            self._change.notify()
+
+    def _run(self) -> None:
+        while (session := self._next()) is not None:
+            session.step()
+
+    def _next(self) -> Session | None:
+        """Wait for a session with something to do; None at the end."""
+        with self._change:
+            while not self._stopping:
+                for _ in self._sessions:
+                    self._sessions.rotate(-1)
+                    if self._sessions[-1].has_work:
+                        return self._sessions[-1]
+                self._change.wait()
+        return None
