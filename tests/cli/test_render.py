@@ -153,7 +153,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
     fake = Fake()
     machine = SimpleNamespace(name="llvm", llvm_version="22", vector_width=8)
     monkeypatch.setattr(render, "Rendering", fake.rendering)
-    monkeypatch.setattr(drpt.Rendering, "launcher", lambda _: fake)
+    monkeypatch.setattr(drpt.Rendering, "launcher", fake)
     monkeypatch.setattr(backend, "load", lambda: None)
     monkeypatch.setattr(backend, "describe", lambda: machine)
     return fake
