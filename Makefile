@@ -9,7 +9,8 @@ demo: $(STAMP)  ## render the Cornell box
 	@$(BIN)/drpt-render cornell-box --spp 256 --bounces 2 --mode explicit \
 		-o out/cornell-box.exr -o out/cornell-box.png
 
-test: $(STAMP)  ## every test
+test: $(STAMP)  ## every test; those of the browser need Chromium, which is installed if it may be
+	@tools/browser.sh
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-quick: $(STAMP)  ## the tests that take no more than a few seconds
@@ -30,8 +31,11 @@ references: $(STAMP)  ## make Mitsuba's pictures in reference/ again, a quarter 
 stress: $(STAMP)  ## numbers at the edges: a table of errors and bounds; fails where one is exceeded
 	$(BIN)/python -m benchmarks.stress
 
-docs: $(STAMP)  ## build the documentation to out/docs
+docs: $(STAMP) out/docs/gallery/index.html  ## build the documentation to out/docs, the gallery too
 	$(BIN)/python -m sphinx -b html -W --keep-going -q docs out/docs
+
+out/docs/gallery/index.html: $(shell find src/drpt scenes -type f -not -name '*.pyc') | $(STAMP)
+	$(BIN)/drpt gallery -o $(@D)
 
 bench: $(STAMP)  ## error against time, beside Mitsuba: tables and plots in out/bench, 20 minutes
 	$(BIN)/python -m benchmarks.bench

@@ -1,8 +1,10 @@
-"""`drpt gallery`: bad folders, the page, Ctrl-C."""
+"""`drpt gallery`: bad folders, the page, signals."""
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -12,11 +14,14 @@ from drpt.gallery.figures import DIFFUSE, Figure, Plan, Row, Setting
 from drpt.render import Mode
 from tests.cli.running import files, status_of
 
+if TYPE_CHECKING:
+    from drpt.result import Result
+
 
 @pytest.fixture(autouse=True)
-def _one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+def _two_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     def plan(size: int) -> Plan:
-        row = Row((Setting(DIFFUSE, Mode.EXPLICIT, "sobol", 1, 1),))
+        row = Row(tuple(Setting(DIFFUSE, Mode.EXPLICIT, "sobol", spp, 1) for spp in (1, 2)))
         return Plan(size // 16, (Figure("A figure", "", (row,), ()),), ())
 
     monkeypatch.setattr(figures, "course_plan", plan)
@@ -40,13 +45,34 @@ def test_a_file_is_no_folder(folder: str, capsys: pytest.CaptureFixture[str]) ->
     assert files() == before
 
 
-def test_after_ctrl_c_there_is_a_page(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_after_a_signal_there_is_a_page_of_what_is_finished(
+    number: signal.Signals,
+    status: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
+    """It comes in the first picture, after which the second is not begun."""
+    render = rendering.Darkroom.render
 
-    monkeypatch.setattr(rendering.Darkroom, "render", interrupted)
-    assert cli.main(["gallery", "-o", "."]) == 130
-    assert capsys.readouterr().err == "drpt gallery: interrupted\n"
-    assert "not complete" in Path("index.html").read_text(encoding="utf-8")
+    def signalled(self: rendering.Darkroom, *args: Any, **settings: Any) -> Result:
+        if self.references:
+            signal.raise_signal(number)
+            monkeypatch.setattr(rendering.Darkroom, "render", render)
+        return render(self, *args, **settings)
+
+    monkeypatch.setattr(rendering.Darkroom, "render", signalled)
+    assert cli.main(["gallery", "-o", "."]) == status
+    printed, said = capsys.readouterr()
+    assert (printed, said.count("\n")) == ("index.html\n", 1)
+    assert "it has 1 of 2 pictures" in Path("index.html").read_text(encoding="utf-8")
+
+
+def test_a_second_signal_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    def signalled(*_: object, **__: object) -> None:
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(rendering.Darkroom, "render", signalled)
+    assert status_of(cli.main, ["gallery", "-o", "."]) == 143
+    assert "it has 0 of 2 pictures" in Path("index.html").read_text(encoding="utf-8")

@@ -14,5 +14,5 @@ def plan() -> Plan:
         Row(tuple(Setting(DIFFUSE, Mode.EXPLICIT, sampler, spp, 1) for spp in (1, 16)))
         for sampler in ("sobol", "independent")
     )
-    figure = Figure("A figure", "Words & <more>.", rows, (Crop(0.25, 0.5, 0.25),))
+    figure = Figure("A figure", "Words & <more>.", rows, (Crop("a place", 0.25, 0.5, 0.25),))
     return Plan(SIZE, (figure,), (Curve("A curve", DIFFUSE, 1, (Mode.EXPLICIT,), (1, 4)),))

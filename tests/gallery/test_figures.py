@@ -34,6 +34,7 @@ def test_mis_stands_beside_explicit_sampling() -> None:
     assert {(scene, *rest) for scene, _, *rest in shown("sobol", Mode.MIS)} == explicit
 
 
-def test_names_of_files_differ() -> None:
-    settings = course_plan().settings
-    assert len({setting.name for setting in settings}) == len(settings)
+def test_the_courses_own_pictures_are_known() -> None:
+    course = course_plan().course
+    assert {(s.scene, str(s.mode), s.spp, s.bounces) for s in course} == COURSE
+    assert len(course) == len(COURSE)

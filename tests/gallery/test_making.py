@@ -8,6 +8,7 @@ import pytest
 from drpt.gallery import making
 from drpt.gallery.answers import Answer, Finding, Shown, Table
 from drpt.gallery.making import make_gallery, steps
+from drpt.output import to_display
 from tests.gallery.checker import checked
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def question(darkroom: Darkroom) -> Answer:
     DARKROOMS.append(darkroom)
     findings = Finding("Yes.", holds=True), Finding("1 < 0.", holds=False)
     table = Table("A table", ("", "x"), (("row", "2"),))
-    picture = Shown("shown", "A picture", np.full((4, 4, 3), 0.5))
+    picture = Shown("A picture", np.full((4, 4, 3), 0.5))
     return Answer("Why?", "Because of `x`.", findings, table, pictures=(picture,))
 
 
@@ -54,12 +55,16 @@ def test_the_page_shows_all_that_was_measured(plan: Plan, tmp_path: Path) -> Non
     assert "not complete" not in page.text
 
 
-def test_figures_stand_beside_their_details(plan: Plan, tmp_path: Path) -> None:
-    page = checked(make_gallery(tmp_path, plan))
-    sources = [image["src"] for image in page.images]
+def test_the_page_holds_pictures_and_their_details(plan: Plan, tmp_path: Path) -> None:
+    """A quarter of each picture, from a quarter to the right and a half down, is a detail."""
+    pictures = iter(checked(make_gallery(tmp_path, plan)).pictures)
     for setting in plan.figures[0].settings:
-        assert sources.count(f"pictures/{setting.name}.png") == 2
-    assert sources.count("pictures/shown.png") == 1
+        expected = to_display(DARKROOMS[0].picture(setting).image)
+        for words, part in ((str(setting), expected), ("detail: a place", expected[8:12, 4:8])):
+            name, shown = next(pictures)
+            assert name == words
+            np.testing.assert_array_equal(shown, part)
+    assert [name for name, _ in pictures] == ["A picture"]
 
 
 def test_an_interrupt_leaves_a_page_of_what_is_finished(plan: Plan, tmp_path: Path) -> None:
@@ -76,10 +81,10 @@ def test_an_interrupt_leaves_a_page_of_what_is_finished(plan: Plan, tmp_path: Pa
     page = checked(tmp_path / "index.html")
     assert "This page is not complete: it has 2 of 6 pictures." in page.text
     first, second, third, *_ = plan.settings
-    links = "".join(page.links)
-    assert first.name in links
-    assert second.name in links
-    assert third.name not in links
+    shown = [words for words, _ in page.pictures]
+    assert str(first) in shown
+    assert str(second) in shown
+    assert str(third) not in shown
     assert "Why?" not in page.text
 
 
@@ -89,4 +94,4 @@ def test_an_interrupt_at_once_leaves_a_page(plan: Plan, tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         make_gallery(tmp_path, plan, interrupt)
-    assert checked(tmp_path / "index.html").images == []
+    assert checked(tmp_path / "index.html").pictures == []

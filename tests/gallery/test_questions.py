@@ -10,7 +10,7 @@ from drpt.gallery.figures import GLOSSY
 from drpt.gallery.mirror import BOUNCES, make_views, mirror
 from drpt.gallery.parts import Part, coverage, with_material
 from drpt.gallery.questions import QUESTIONS
-from drpt.gallery.rendering import Darkroom, rel_mse, sized
+from drpt.gallery.rendering import Darkroom, rel_mse
 from drpt.render import Mode, render
 from drpt.scene import Diffuse, Mesh, Phong, load_scene
 
@@ -25,7 +25,7 @@ SIZE = 64
 
 @pytest.fixture
 def result() -> Result:
-    return render(sized(load_scene(GLOSSY), 4), 16, 1, Mode.EXPLICIT)
+    return render(load_scene(GLOSSY).resized(4, 4), 16, 1, Mode.EXPLICIT)
 
 
 @pytest.mark.slow
@@ -48,7 +48,7 @@ def test_findings_can_fail(result: Result, monkeypatch: pytest.MonkeyPatch) -> N
 def test_the_mirrored_ray_is_a_reflection() -> None:
     """Angles on both sides of the normal are equal, and the way meets the mirror."""
     scene = load_scene(GLOSSY)
-    views = make_views(scene)
+    views = make_views(scene, side=30, size=4)
     eye, seen = views.reflected.camera, views.direct.camera
     arriving = np.subtract(eye.target, eye.eye)
     leaving = np.subtract(seen.target, seen.eye)
@@ -77,7 +77,7 @@ def test_parts_are_those_of_the_scene() -> None:
 
 def test_coverage_adds_up_and_tells_left_from_right() -> None:
     """The room fills the picture; the red wall is on its left."""
-    scene = sized(load_scene(GLOSSY), 16)
+    scene = load_scene(GLOSSY).resized(16, 16)
     shares = {part: coverage(scene, part) for part in Part}
     np.testing.assert_allclose(sum(shares.values()), 1, atol=1e-6)
     assert shares[Part.RED_WALL][:, :8].sum() > 0

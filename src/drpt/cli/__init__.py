@@ -20,6 +20,7 @@ from drpt.cli import (
     merge,
     render,
     scenes,
+    view,
 )
 from drpt.cli.parser import Parser, add_version
 from drpt.cli.status import FAILED, INTERRUPTED, drop_stdout, say
@@ -29,7 +30,19 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
-COMMANDS = (render, compare, merge, convert, gallery, check, scenes, explain, doctor, completion)
+COMMANDS = (
+    render,
+    view,
+    compare,
+    merge,
+    convert,
+    gallery,
+    check,
+    scenes,
+    explain,
+    doctor,
+    completion,
+)
 """In the order in which ``drpt --help`` lists them."""
 
 

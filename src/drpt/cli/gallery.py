@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drpt.cli.status import STATUSES, bad_input
+from drpt.cli.interrupts import interrupts_noted
+from drpt.cli.status import STATUSES, TERMINATED, bad_input
 from drpt.kernel import backend
 from drpt.output import check_file
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable, Iterator
 
+    from drpt.cli.interrupts import Request
     from drpt.cli.parser import Commands
 
 FOLDER = Path("out/gallery")
@@ -27,12 +29,12 @@ def add(commands: Commands) -> None:
         help="render a rendering course's pictures onto a page",
         description="""Render a rendering course's figures, in about a minute, and write a page with
 the pictures side by side, their times and errors, and measured answers to the
-course's questions. Ctrl-C leaves a page of what is finished.""",
+course's questions. Ctrl-C and SIGTERM leave a page of what is finished.""",
         epilog=f"""examples:
   drpt gallery
   drpt gallery --quick -o preview
 
-exit status: {STATUSES}""",
+exit status: {STATUSES}, {TERMINATED} after SIGTERM""",
     )
     parser.add_argument(
         "-o",
@@ -40,7 +42,7 @@ exit status: {STATUSES}""",
         metavar="FOLDER",
         type=Path,
         default=FOLDER,
-        help="write index.html and the folder pictures there (default: %(default)s)",
+        help="write index.html there, one file that holds all pictures (default: %(default)s)",
     )
     parser.add_argument(
         "--quick",
@@ -63,10 +65,25 @@ def run(args: argparse.Namespace) -> int:
         check_file(folder / PAGE)
         backend.load()
     plan = course_plan(QUICK_SIZE if args.quick else SIZE)
-    with _step_bar(steps(plan)) as on_step:
-        path = make_gallery(folder, plan, on_step)
-    print(path)
-    return 0
+    with (
+        interrupts_noted() as request,
+        _step_bar(steps(plan)) as on_step,
+        suppress(KeyboardInterrupt),
+    ):
+        make_gallery(folder, plan, _until(request, on_step))
+    print(folder / PAGE)
+    return request.status
+
+
+def _until(request: Request, on_step: Callable[[str], None]) -> Callable[[str], None]:
+    """Return what ends the work before the first step after a signal."""
+
+    def step(words: str) -> None:
+        if request.signal:
+            raise KeyboardInterrupt
+        on_step(words)
+
+    return step
 
 
 @contextmanager

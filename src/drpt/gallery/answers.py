@@ -17,9 +17,9 @@ class Finding(NamedTuple):
     holds: bool
 
 
-def times(ratio: float) -> str:
-    """Return a ratio in two digits that count, as people write it."""
-    return f"{float(f'{ratio:.2g}'):,g}"
+def rounded(value: float, digits: int = 2) -> str:
+    """Return a number in a few digits that count, as people write it."""
+    return f"{float(f'{value:.{digits}g}'):,g}"
 
 
 class Table(NamedTuple):
@@ -31,9 +31,8 @@ class Table(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """A picture for display: linear colours (height, width, 3) under a file name."""
+    """A picture for display: linear colours (height, width, 3)."""
 
-    name: str
     caption: str
     image: NDArray[np.floating]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drpt.error import DARK
-from drpt.gallery.answers import Answer, Finding, Table
+from drpt.gallery.answers import Answer, Finding, Shown, Table
 from drpt.gallery.figures import DIFFUSE, Setting
 from drpt.gallery.parts import Part, coverage
 from drpt.render import Mode
@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 
 QUESTION = "Why do more bounces make the picture brighter and noisier?"
 TEXT = """Each further bounce adds the light of longer paths. Light is never negative, so the
-picture can only get brighter, and as walls keep a part of all light, each bounce adds less than the
-one before. A longer path also takes one more random direction: what it adds varies from sample to
-sample, and so does the sum. The lamp itself is left out of these numbers, as its edge is noisy with
-any number of bounces."""
+picture can only get brighter, and as walls absorb a part of all light, each bounce adds less than
+the one before. A longer path also takes one more random direction: what it adds varies from sample
+to sample, and so does the sum. The lamp itself is left out of these numbers, as its edge is noisy
+with any number of bounces."""
 BOUNCES = (2, 3, 4)
+AMPLIFICATION = 4
+"""Of the light that a bounce adds, to be seen."""
 WAYS = ((Mode.IMPLICIT, 1024), (Mode.EXPLICIT, 10))
 """Of which the pictures with independent samples are measured: their errors are variances."""
 
@@ -30,10 +32,8 @@ WAYS = ((Mode.IMPLICIT, 1024), (Mode.EXPLICIT, 10))
 def brightness(darkroom: Darkroom) -> Answer:
     """Measure means and noise of the diffuse box."""
     no_lamp = coverage(darkroom.scene(DIFFUSE), Part.LAMP) == 0
-    truths = [
-        darkroom.reference(DIFFUSE, bounces).image[no_lamp].astype(np.float64)
-        for bounces in BOUNCES
-    ]
+    references = [darkroom.reference(DIFFUSE, bounces).image for bounces in BOUNCES]
+    truths = [reference[no_lamp].astype(np.float64) for reference in references]
     means = [float(truth.mean()) for truth in truths]
     noise, relative = {}, {}
     for mode, spp in WAYS:
@@ -45,7 +45,18 @@ def brightness(darkroom: Darkroom) -> Answer:
             float((square / (truth**2 + DARK)).mean())
             for square, truth in zip(squares, truths, strict=True)
         ]
-    return Answer(QUESTION, TEXT, _findings(means, noise, relative), _table(means, noise, relative))
+    return Answer(
+        QUESTION,
+        TEXT,
+        _findings(means, noise, relative),
+        _table(means, noise, relative),
+        pictures=tuple(
+            Shown(
+                f"What bounce {number} adds, {AMPLIFICATION} times as bright", AMPLIFICATION * light
+            )
+            for number, light in zip(BOUNCES[1:], np.diff(references, axis=0), strict=True)
+        ),
+    )
 
 
 def _findings(

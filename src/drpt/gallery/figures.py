@@ -31,11 +31,6 @@ class Setting:
     bounces: int
 
     @property
-    def name(self) -> str:
-        """Name of its file, without the suffix."""
-        return f"{self.scene}-{self.mode}-{self.sampler}-{self.spp}-spp-{self.bounces}-bounces"
-
-    @property
     def way(self) -> str:
         """Mode and sampler."""
         return f"{MODE_NAMES.get(self.mode, self.mode)}, {SAMPLER_NAMES[self.sampler]}"
@@ -53,6 +48,7 @@ class Setting:
 class Crop(NamedTuple):
     """A square of a picture: left and upper edge, and side, as shares of the picture's side."""
 
+    name: str
     left: float
     top: float
     side: float
@@ -117,9 +113,18 @@ class Plan:
         plotted = (setting for curve in self.curves for setting in curve.settings)
         return list(dict.fromkeys((*shown, *plotted)))
 
+    @property
+    def course(self) -> list[Setting]:
+        """Of the course's own pictures, which know neither MIS nor Sobol' points."""
+        shown = dict.fromkeys(setting for figure in self.figures for setting in figure.settings)
+        return [s for s in shown if s.sampler == "independent" and s.mode != Mode.MIS]
 
-SHADOW, CEILING = Crop(0.1, 0.45, 0.2), Crop(0.1, 0.04, 0.2)
-MIRROR, HIGHLIGHT = Crop(0.34, 0.58, 0.2), Crop(0.4, 0.3, 0.2)
+
+SHADOW = Crop("shadow of the large box", 0.1, 0.45, 0.2)
+CORNER = Crop("corner of ceiling and red wall", 0.1, 0.04, 0.2)
+MIRROR = Crop("reflection of the small box", 0.34, 0.58, 0.2)
+SATIN = Crop("satin back wall", 0.5, 0.38, 0.2)
+CAUSTIC = Crop("caustic on the ceiling", 0.2, 0.1, 0.2)
 
 
 def course_plan(size: int = 256) -> Plan:
@@ -127,10 +132,10 @@ def course_plan(size: int = 256) -> Plan:
     few = tuple(
         Figure(
             f"Diffuse box, few samples, {bounces} bounces",
-            "Explicit sampling lights every vertex, so that a few samples show what implicit "
-            "sampling needs a thousand for. On diffuse surfaces MIS has nothing to add.",
+            "Explicit sampling lights every vertex, so that some tens of samples show what "
+            "implicit sampling needs a thousand for. On diffuse surfaces MIS has nothing to add.",
             _rows((Mode.EXPLICIT, Mode.MIS), [(DIFFUSE, spp, bounces) for spp in samples]),
-            (SHADOW, CEILING),
+            (SHADOW, CORNER),
         )
         for bounces, samples in ((2, (1, 10)), (3, (1, 10, 100)), (4, (1, 10, 100)))
     )
@@ -155,7 +160,7 @@ def _implicit() -> Figure:
         "Paths find the lamp only where they run into it. Twice the samples halve the squared "
         "error, which the eye hardly sees; more bounces brighten what the lamp does not see.",
         _rows((Mode.IMPLICIT,), [(DIFFUSE, 512, 2), *((DIFFUSE, 1024, b) for b in (2, 3, 4))]),
-        (SHADOW, CEILING),
+        (SHADOW, CORNER),
     )
 
 
@@ -168,7 +173,7 @@ def _lights() -> Figure:
             *_rows((Mode.IMPLICIT,), [(scene, 1024, 2) for scene in RADII]),
             *_rows((Mode.EXPLICIT, Mode.MIS), [(scene, 10, 2) for scene in RADII]),
         ),
-        (SHADOW, CEILING),
+        (SHADOW, CORNER),
     )
 
 
@@ -176,8 +181,8 @@ def _glossy() -> Figure:
     return Figure(
         "Glossy box, 1024 spp, 2, 3 and 4 bounces",
         "The back wall is satin (Phong exponent 50), the large box polished (1000). Implicit "
-        "sampling is good at what mirrors show, explicit sampling at what lamps light; MIS takes "
-        "of both what is good.",
+        "sampling is good where a mirror shows the lamp, explicit sampling where the lamp lights a "
+        "rough wall; MIS takes of both what is good.",
         _rows((Mode.IMPLICIT, Mode.EXPLICIT, Mode.MIS), [(GLOSSY, 1024, b) for b in (2, 3, 4)]),
-        (MIRROR, HIGHLIGHT, CEILING),
+        (MIRROR, SATIN, CAUSTIC),
     )

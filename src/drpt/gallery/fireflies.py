@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drpt.crosscheck.colours import signed_colours
-from drpt.gallery.answers import Answer, Finding, Shown, Table, times
+from drpt.gallery.answers import Answer, Finding, Shown, Table, rounded
 from drpt.gallery.figures import GLOSSY, MODE_NAMES, Setting
 from drpt.gallery.parts import Part, coverage, with_material
 from drpt.render import Mode
@@ -28,9 +28,10 @@ and on in a random direction. Few paths meet the box just so that it mirrors the
 explicit sampling weights those few with the full height of the lobe (exponent 1000): most samples
 miss the caustic, and a few are bright spots. The box stands on the left of these pictures, at the
 red wall, and its top mirrors the lamp to the ceiling above it: so the fireflies are on the left
-here. They are on the right in mirrored pictures, which have the red wall on the right. MIS leaves
-those paths to the direction that the box reflects into, which runs into the lamp, and weights the
-light sample with next to nothing."""
+here. In mirrored pictures, with the red wall on the right, they are on the right. MIS leaves those
+paths to the direction that the box reflects into, which runs into the lamp, and weights the light
+sample with next to nothing. What remains with every mode is the edge of the lamp, a ring in the
+pictures below."""
 BOUNCES, SPP = 4, 1024
 FIREFLY = 0.2
 """Error, as a mean over the channels, from which a pixel counts as one; white is 1."""
@@ -86,12 +87,13 @@ def _cause(darkroom: Darkroom, place: Mask) -> Finding:
     polished = darkroom.scene(GLOSSY)
     rough = with_material(polished, Part.LARGE_BOX, Diffuse(0.86))
     way = CAUSE_SPP, CAUSE_BOUNCES, Mode.EXPLICIT, "independent"
-    errors = [darkroom.render(scene, *way).standard_error[place] for scene in (polished, rough)]
-    noise = [float(np.square(error).mean()) for error in errors]
+    runs = [darkroom.render(scene, *way) for scene in (polished, rough)]
+    noise = [float(np.square(run.standard_error[place]).mean()) for run in runs]
+    gain = noise[0] / noise[1]
     return Finding(
         "The polished box makes them: with a diffuse one in its place, the variance on the left of "
-        f"the ceiling is about {times(noise[0] / noise[1])} times lower ({CAUSE_BOUNCES} bounces).",
-        noise[0] > noise[1],
+        f"the ceiling is about {rounded(gain)} times lower ({CAUSE_BOUNCES} bounces).",
+        gain > 1,
     )
 
 
@@ -107,7 +109,7 @@ def _cure(errors: dict[Mode, Floats]) -> tuple[Finding, ...]:
             counts[Mode.MIS] < counts[Mode.EXPLICIT],
         ),
         Finding(
-            f"The mean squared error of MIS is {times(gain)} times lower than that of explicit "
+            f"The mean squared error of MIS is {rounded(gain)} times lower than that of explicit "
             "sampling.",
             gain > 1,
         ),
@@ -135,7 +137,6 @@ def _table(errors: dict[Mode, Floats], shows: dict[Part, Mask], left: Mask) -> T
 def _shown(mode: Mode, error: Floats) -> Shown:
     name = MODE_NAMES.get(mode, mode)
     return Shown(
-        f"error-{mode}",
         f"Error of {name}: too bright is red, too dark blue, full from ±{END:g}",
         signed_colours(error, END),
     )

@@ -7,18 +7,14 @@ from time import perf_counter, process_time
 from typing import TYPE_CHECKING
 
 from drpt.gallery.figures import course_plan
-from drpt.gallery.markup import PICTURES
 from drpt.gallery.page import Page
 from drpt.gallery.questions import QUESTIONS
 from drpt.gallery.rendering import Darkroom
-from drpt.output import replacing, write
+from drpt.output import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from os import PathLike
-
-    import numpy as np
-    from numpy.typing import NDArray
 
     from drpt.gallery.answers import Answer
     from drpt.gallery.figures import Plan
@@ -36,11 +32,11 @@ def make_gallery(
     Parameters
     ----------
     folder
-        Where ``index.html`` and the folder ``pictures`` go; it must exist.
+        Where ``index.html`` goes; it must exist.
     plan
         What to render; the course's figures by default.
     on_step
-        Called before each of the `steps` with words for what comes.
+        Called before each of the `steps` with words for what comes; what it raises ends the work.
 
     Returns
     -------
@@ -50,7 +46,7 @@ def make_gallery(
     Raises
     ------
     OSError
-        A file cannot be written.
+        The page cannot be written.
     """
     making = _Making(Path(folder), plan or course_plan(), on_step)
     try:
@@ -72,8 +68,6 @@ class _Making:
 
     def __init__(self, folder: Path, plan: Plan, on_step: Callable[[str], object]) -> None:
         self.path = folder / PAGE
-        self._pictures = folder / PICTURES
-        self._pictures.mkdir(exist_ok=True)
         self._plan = plan
         self._on_step = on_step
         self._darkroom = Darkroom(plan.size, on_step)
@@ -83,17 +77,11 @@ class _Making:
 
     def run(self) -> None:
         """Render and measure everything."""
-        for figure in self._plan.figures:
-            for setting in figure.settings:
-                self._save(setting.name, self._darkroom.picture(setting).image)
         for setting in self._plan.settings:
             self._darkroom.picture(setting)
         for question in QUESTIONS:
             self._on_step(question.__name__)
-            answer = question(self._darkroom)
-            for picture in answer.pictures:
-                self._save(picture.name, picture.image)
-            self._answers.append(answer)
+            self._answers.append(question(self._darkroom))
         self._complete = True
 
     def write_page(self) -> None:
@@ -102,6 +90,3 @@ class _Making:
         page = Page(self._plan, self._darkroom, self._answers, seconds, cpu_seconds, self._complete)
         with replacing(self.path) as stream:
             stream.write(page.html().encode())
-
-    def _save(self, name: str, image: NDArray[np.floating]) -> None:
-        write(self._pictures / f"{name}.png", image, {})

@@ -5,15 +5,17 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from drpt.gallery.embedding import address, cut
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from drpt.gallery.answers import Answer, Finding, Shown, Table
     from drpt.gallery.figures import Crop
     from drpt.gallery.rendering import Picture
-
-PICTURES = "pictures"
-"""The folder of the pictures, beside the page."""
 
 
 def section(number: int, title: str, body: str) -> str:
@@ -40,18 +42,14 @@ def row(label: str, cards: Iterable[str]) -> str:
 
 def card(picture: Picture, crops: tuple[Crop, ...]) -> str:
     """A picture, places in it enlarged, its setting and its measures."""
-    setting = picture.setting
-    source = f"{PICTURES}/{setting.name}.png"
-    size = picture.image.shape[0]
+    setting, image = picture.setting, picture.image
     places = "".join(f'<i class="place" style="{_place(crop)}"></i>' for crop in crops)
     details = "".join(
-        f'<span class="crop"><img src="{source}" alt="detail {number}" loading="lazy" '
-        f'style="{_enlarged(crop)}"></span>'
-        for number, crop in enumerate(crops, start=1)
+        f'<img src="{address(cut(image, crop))}" alt="detail: {escape(crop.name)}" loading="lazy">'
+        for crop in crops
     )
     return (
-        f'<figure><a class="picture" href="{source}"><img src="{source}" width="{size}" '
-        f'height="{size}" loading="lazy" alt="Cornell box, {escape(str(setting))}">{places}</a>\n'
+        f"<figure>{_button(image, str(setting), places)}\n"
         f'<span class="crops">{details}</span>\n'
         f"<figcaption><strong>{escape(setting.short)}</strong><br>{picture.seconds:.2g} s, "
         f"relMSE {picture.rel_mse:.2g}</figcaption></figure>\n"
@@ -59,18 +57,23 @@ def card(picture: Picture, crops: tuple[Crop, ...]) -> str:
 
 
 def table(content: Table) -> str:
-    """A table that scrolls where the page is narrow."""
+    """A table."""
     head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in content.head)
     rows = "".join(
         f'<tr><th scope="row">{escape(first)}</th>'
         f"{''.join(f'<td>{escape(cell)}</td>' for cell in rest)}</tr>\n"
         for first, *rest in content.rows
     )
-    return (
-        f'<div class="wide" role="region" tabindex="0" aria-label="{escape(content.caption)}">'
+    return wide(
+        content.caption,
         f"<table><caption>{escape(content.caption)}</caption>\n"
-        f"<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>"
+        f"<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>",
     )
+
+
+def wide(label: str, body: str) -> str:
+    """What scrolls by itself where the page is narrow."""
+    return f'<div class="wide" role="region" tabindex="0" aria-label="{escape(label)}">{body}</div>'
 
 
 def folded(summary: str, body: str) -> str:
@@ -85,7 +88,7 @@ def answer(content: Answer) -> str:
     parts = (
         paragraph(content.text),
         f'<h3>Measured</h3>\n<ul class="findings">\n{findings}\n</ul>',
-        content.chart,
+        wide("Chart", content.chart) if content.chart else "",
         f'<div class="row">\n{pictures}</div>' if pictures else "",
         table(content.table),
     )
@@ -104,21 +107,19 @@ def _finding(finding: Finding) -> str:
 
 
 def _shown(picture: Shown) -> str:
-    source = f"{PICTURES}/{picture.name}.png"
-    height, width, _ = picture.image.shape
+    button = _button(picture.image, picture.caption)
+    return f"<figure>{button}<figcaption>{escape(picture.caption)}</figcaption></figure>\n"
+
+
+def _button(image: NDArray[np.floating], words: str, marks: str = "") -> str:
+    """A picture that is shown large when it is chosen."""
+    height, width, _ = image.shape
     return (
-        f'<figure><a class="picture" href="{source}"><img src="{source}" width="{width}" '
-        f'height="{height}" loading="lazy" alt="{escape(picture.caption)}"></a>'
-        f"<figcaption>{escape(picture.caption)}</figcaption></figure>\n"
+        f'<button type="button" class="picture" aria-haspopup="dialog"><img src="{address(image)}" '
+        f'width="{width}" height="{height}" loading="lazy" alt="{escape(words)}">{marks}</button>'
     )
 
 
 def _place(crop: Crop) -> str:
-    left, top, side = (100 * share for share in crop)
+    left, top, side = (100 * share for share in (crop.left, crop.top, crop.side))
     return f"left:{left:g}%;top:{top:g}%;width:{side:g}%;height:{side:g}%"
-
-
-def _enlarged(crop: Crop) -> str:
-    """How a whole picture lies behind a window that shows a part of it."""
-    left, top, side = crop
-    return f"width:{100 / side:g}%;left:{-100 * left / side:g}%;top:{-100 * top / side:g}%"

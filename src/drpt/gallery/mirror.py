@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drpt.gallery.answers import Answer, Finding, Table
+from drpt.gallery.answers import Answer, Finding, Shown, Table
 from drpt.gallery.figures import GLOSSY
 from drpt.gallery.parts import Part
 from drpt.render import Mode
@@ -28,14 +28,19 @@ QUESTION = (
 TEXT = """Because it has. Light that comes from the small box by way of the mirror has bounced once
 more when it reaches the eye, and `bounces` counts that one, too. To see it in numbers, two cameras
 look at the same spot of the small box, on the side that the large box reflects: one from the eye,
-by way of the mirror, and one from the mirror, directly. What the mirror keeps is divided out: its
-albedo, times the cosine of the angle of incidence, as Phong lobes have it."""
+by way of the mirror, and one from the mirror, directly. What comes by way of the mirror is divided
+by the share that the mirror reflects: its albedo, times the cosine of the angle of incidence, as
+Phong lobes have it. The pictures show more of that side. Those of the reflection are turned back,
+left to right, and begin where the box itself stands before it."""
 BOUNCES = 5
 SPP = 1024
 SIZE = 16
 """Pixels along the sides of the two cameras' pictures."""
 SPOT = 30.0
 """Side of the spot in mm, small beside the box (165 mm), large beside the mirror's blur (10 mm)."""
+SHOWN_BOUNCES, SHOWN_SPP, SHOWN_SIZE = 2, 256, 192
+SHOWN = 100.0
+"""Side of what the pictures show, in mm: more than half of that side of the small box."""
 SIDE = (2, 3, 6, 7)
 """Vertices of the side of the small box that the mirror shows."""
 FACE = (0, 4, 5)
@@ -52,33 +57,52 @@ ABSENT = 0.01
 class Views:
     """The scene, seen from the eye by way of the mirror, and from the mirror.
 
-    ``kept`` is what the mirror keeps of the radiance.
+    ``reflectance`` is the share of the radiance that the mirror reflects.
     """
 
     reflected: Scene
     direct: Scene
-    kept: float
+    reflectance: float
 
 
 def mirror(darkroom: Darkroom) -> Answer:
     """Measure the same spot, reflected and directly, with 1 to 5 bounces."""
-    views = make_views(darkroom.scene(GLOSSY))
+    views = make_views(darkroom.scene(GLOSSY), SPOT, SIZE)
     counts = range(1, BOUNCES + 1)
 
     def mean(view: Scene, bounces: int) -> float:
         return float(darkroom.render(view, SPP, bounces, Mode.MIS).image.mean())
 
     direct = [mean(views.direct, bounces) for bounces in counts]
-    reflected = [mean(views.reflected, bounces) / views.kept for bounces in counts]
+    reflected = [mean(views.reflected, bounces) / views.reflectance for bounces in counts]
     table = Table(
         "Mean radiance of the spot",
         ("", *(f"{bounces} bounce{'s' * (bounces > 1)}" for bounces in counts)),
         (
             ("seen from the mirror", *(f"{value:.4f}" for value in direct)),
-            ("reflected, divided by what is kept", *(f"{value:.4f}" for value in reflected)),
+            ("reflected, divided by the share", *(f"{value:.4f}" for value in reflected)),
         ),
     )
-    return Answer(QUESTION, TEXT, _findings(direct, reflected), table)
+    return Answer(QUESTION, TEXT, _findings(direct, reflected), table, pictures=_pictures(darkroom))
+
+
+def _pictures(darkroom: Darkroom) -> tuple[Shown, ...]:
+    """The side of the box, and its reflection with as many bounces and with one more."""
+    views = make_views(darkroom.scene(GLOSSY), SHOWN, SHOWN_SIZE)
+
+    def image(view: Scene, bounces: int) -> NDArray[np.float32]:
+        return darkroom.render(view, SHOWN_SPP, bounces, Mode.MIS).image
+
+    return (
+        Shown(f"Seen from the mirror, {SHOWN_BOUNCES} bounces", image(views.direct, SHOWN_BOUNCES)),
+        *(
+            Shown(
+                f"Reflected, {bounces} bounces",
+                image(views.reflected, bounces)[:, ::-1] / views.reflectance,
+            )
+            for bounces in (SHOWN_BOUNCES, SHOWN_BOUNCES + 1)
+        ),
+    )
 
 
 def _findings(direct: list[float], reflected: list[float]) -> tuple[Finding, ...]:
@@ -103,8 +127,11 @@ def _findings(direct: list[float], reflected: list[float]) -> tuple[Finding, ...
     )
 
 
-def make_views(scene: Scene) -> Views:
-    """Return both views: the ray from the eye by way of the mirror, and what is left of it."""
+def make_views(scene: Scene, side: float, size: int) -> Views:
+    """Return both views: the ray from the eye by way of the mirror, and what is left of it.
+
+    Their pictures have ``size`` × ``size`` pixels, and show so many mm of the small box.
+    """
     spot = _vertices(scene, Part.SMALL_BOX)[list(SIDE)].mean(axis=0)
     corner, *others = _vertices(scene, Part.LARGE_BOX)[list(FACE)]
     normal = np.cross(others[0] - corner, others[1] - corner)
@@ -113,12 +140,13 @@ def make_views(scene: Scene) -> Views:
     image = spot - 2 * ((spot - corner) @ normal) * normal
     share = ((eye - corner) @ normal) / ((eye - image) @ normal)
     on_mirror = eye + share * (image - eye)
-    distance = float(np.linalg.norm(image - eye))
-    cosine = abs(float((image - eye) @ normal)) / distance
+    before_mirror = on_mirror + SKIN * normal
+    distance = np.linalg.norm(image - eye)
+    cosine = abs(float((image - eye) @ normal / distance))
     return Views(
-        _looking(scene, eye, on_mirror, distance),
-        _looking(scene, on_mirror + SKIN * normal, spot, float(np.linalg.norm(spot - on_mirror))),
-        kept=cosine * _albedo(scene.shapes[Part.LARGE_BOX]),
+        _looking(scene, eye, on_mirror, _fov(side, distance), size),
+        _looking(scene, before_mirror, spot, _fov(side, np.linalg.norm(spot - on_mirror)), size),
+        reflectance=cosine * _albedo(scene.shapes[Part.LARGE_BOX]),
     )
 
 
@@ -127,10 +155,14 @@ def _albedo(shape: Shape) -> float:
     return float(np.mean(shape.material.albedo))
 
 
-def _looking(scene: Scene, eye: Point, target: Point, distance: float) -> Scene:
-    """Return the scene with a camera to which the spot, so far away, fills the picture."""
-    fov = 2 * np.degrees(np.arctan(SPOT / 2 / distance))
-    camera = Camera(tuple(eye), tuple(target), scene.camera.up, float(fov), SIZE, SIZE)
+def _fov(side: float, distance: np.floating) -> float:
+    """Angle, in degrees, under which a length is seen."""
+    return float(2 * np.degrees(np.arctan(side / 2 / distance)))
+
+
+def _looking(scene: Scene, eye: Point, target: Point, fov: float, size: int) -> Scene:
+    """Return the scene with another camera."""
+    camera = Camera(tuple(eye), tuple(target), scene.camera.up, fov, size, size)
     return replace(scene, camera=camera)
 
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drpt.gallery.answers import Answer, Finding, Table, times
+from drpt.gallery.answers import Answer, Finding, Table, rounded
 from drpt.gallery.charts import log_log
 from drpt.gallery.figures import GLOSSY, MODE_NAMES
 from drpt.gallery.parts import Part, coverage, with_material
-from drpt.gallery.rendering import REFERENCE_SEED, sized
+from drpt.gallery.rendering import REFERENCE_SEED
 from drpt.render import Mode
 from drpt.scene import Phong
 
@@ -51,7 +51,7 @@ def sweep(darkroom: Darkroom) -> Answer:
     """
     from scipy.ndimage import binary_erosion
 
-    scene = sized(darkroom.scene(GLOSSY), SIZE)
+    scene = darkroom.scene(GLOSSY).resized(SIZE, SIZE)
     wall = binary_erosion(coverage(scene, Part.BACK_WALL) == 1)
     rows = [_variances(darkroom, scene, wall, exponent) for exponent in EXPONENTS]
     by_mode = {mode: [row[mode] for row in rows] for mode in MODES}
@@ -64,7 +64,7 @@ def sweep(darkroom: Darkroom) -> Answer:
             "Variance of one sample on the back wall",
             ("exponent", *names.values()),
             tuple(
-                (f"{exponent:,}", *(f"{row[mode]:.3g}" for mode in MODES))
+                (f"{exponent:,}", *(rounded(row[mode], 3) for mode in MODES))
                 for exponent, row in zip(EXPONENTS, rows, strict=True)
             ),
         ),
@@ -101,7 +101,7 @@ def _findings(by_mode: dict[Mode, list[float]]) -> tuple[Finding, ...]:
     excess = float((mis / np.minimum(implicit, explicit)).max())
     return (
         Finding(
-            f"At exponent {EXPONENTS[0]} explicit sampling has {times(gain[0])} times less "
+            f"At exponent {EXPONENTS[0]} explicit sampling has {rounded(gain[0])} times less "
             "variance than implicit sampling.",
             bool(gain[0] > 1),
         ),
@@ -111,7 +111,7 @@ def _findings(by_mode: dict[Mode, list[float]]) -> tuple[Finding, ...]:
             bool(gain[0] > 1 and (gain[crossed:] < 1).all()),
         ),
         Finding(
-            f"At exponent {EXPONENTS[-1]:,} it has {times(1 / gain[-1])} times more.",
+            f"At exponent {EXPONENTS[-1]:,} it has {rounded(1 / gain[-1])} times more.",
             bool(gain[-1] < 1),
         ),
         Finding(

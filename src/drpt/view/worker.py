@@ -85,7 +85,7 @@ class Worker:
         """Wait for a session with something to do; None at the end."""
         with self._change:
             while not self._stopping:
-                for _ in self._sessions:
+                for _ in range(len(self._sessions)):
                     self._sessions.rotate(-1)
                     if self._sessions[-1].has_work:
                         return self._sessions[-1]
