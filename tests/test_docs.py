@@ -41,7 +41,10 @@ NOT_RUN = {
     ("docs/how-to/install.md", "sudo apt"),
     ("docs/how-to/install.md", "python -m"),
     ("docs/how-to/layers.md", "python -m"),
+    ("README.md", "drpt view"),
     ("docs/how-to/preview.md", "drpt-render veach"),
+    ("docs/how-to/view.md", "drpt view"),
+    ("docs/how-to/view.md", "ssh -L"),
     ("docs/how-to/merge.md", "drpt-render veach"),
 }
 """Page and first two words of each block that does not run: installers, what needs other programs

@@ -40,8 +40,8 @@ class Comparison:
     rmse
         Root of the mean of (x − x̂)², in units of radiance.
     mean_difference
-        Relative difference of the means, (3,), one value for each channel; not finite where the
-        reference is black.
+        Relative difference of the means, (3,), one value for each channel: 0 where both are
+        black, infinite where the reference alone is.
     flip
         Mean FLIP of both as a PNG shows them, from 0 to 1; None without the package
         ``flip-evaluator``.
@@ -106,10 +106,15 @@ def compare(image: ArrayLike, reference: ArrayLike) -> Comparison:
         return Comparison(
             error=difference / np.sqrt(y**2 + DARK),
             rmse=float(np.sqrt((difference**2).mean())),
-            mean_difference=difference.mean(axis=(0, 1)) / y.mean(axis=(0, 1)),
+            mean_difference=_relative(difference.mean(axis=(0, 1)), y.mean(axis=(0, 1))),
             flip=mean_flip(x, y) if has_flip() else None,
             non_finite=(_non_finite(x), _non_finite(y)),
         )
+
+
+def _relative(difference: Floats, mean: Floats) -> Floats:
+    """Differences of means, relative to them; none is none even of nothing."""
+    return np.where(difference == 0, 0.0, difference / mean)
 
 
 def _picture(name: str, values: ArrayLike) -> Floats:

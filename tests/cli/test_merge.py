@@ -44,6 +44,11 @@ def test_all_layers_are_merged_and_written(capsys: pytest.CaptureFixture[str]) -
     assert capsys.readouterr() == (f"4x6  32 spp  2 seeds  {error}\nc.exr\n", "")
 
 
+def test_a_single_render_is_told_in_the_singular(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["merge", "a.exr", "-o", "c.exr"]) == 0
+    assert "  1 seed  " in capsys.readouterr().out
+
+
 def test_an_unknown_error_is_called_so(capsys: pytest.CaptureFixture[str]) -> None:
     write("a.exr", IMAGE, {**METADATA, "seed": 2})
     assert cli.main(["merge", "a.exr", "b.exr", "-o", "a.exr"]) == 0

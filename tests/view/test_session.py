@@ -67,7 +67,7 @@ class Browser:
 
     def step(self, steps: int = 1) -> None:
         for _ in range(steps):
-            assert self.session.has_work
+            assert self.session.has_work()
             self.session.step()
 
     def take(self) -> dict[str, Any]:
@@ -94,7 +94,7 @@ class Browser:
 
 def test_a_view_brings_its_scene_and_then_frames() -> None:
     browser = Browser()
-    assert not browser.session.has_work
+    assert not browser.session.has_work()
     browser.view(halves=[MIS], spp=64)
     browser.step(3)
     scene = browser.take()
@@ -118,7 +118,7 @@ def test_it_refines_until_all_samples_are_there_and_shows_what_render_gives() ->
     whole = drpt.render(scene, 2**16, 2, "mis", seed=5).image
     assert seen[-1].images()["radiance"] == pytest.approx(whole, rel=HALF, abs=1e-6)
     browser.session.next_message()
-    assert not browser.session.has_work
+    assert not browser.session.has_work()
 
 
 def test_frames_go_no_faster_than_they_are_drawn() -> None:
@@ -184,15 +184,15 @@ def test_what_is_paused_waits_but_a_change_is_seen() -> None:
     browser.view(halves=[MIS], spp=2**20)
     browser.next_frame()
     browser.say("pause", paused=True)
-    while browser.session.has_work:
+    while browser.session.has_work():
         browser.step()
         browser.session.next_message()
     browser.view(halves=[PLAIN])
     assert browser.next_frame().header["number"] == 2
-    while browser.session.has_work:
+    while browser.session.has_work():
         browser.step()
     browser.say("pause", paused=False)
-    assert browser.session.has_work
+    assert browser.session.has_work()
 
 
 def test_the_mean_square_of_the_difference_is_the_measured_error() -> None:
@@ -295,12 +295,12 @@ def test_one_that_is_not_listened_to_stops() -> None:
     browser = Browser()
     for _ in range(2 * MAX_WAITING):
         browser.view()
-        if not browser.session.has_work:
+        if not browser.session.has_work():
             break
         browser.step()
-    assert not browser.session.has_work
+    assert not browser.session.has_work()
     browser.session.next_message()
-    assert browser.session.has_work
+    assert browser.session.has_work()
 
 
 def test_pictures_and_scenes_can_be_saved(tmp_path: Path) -> None:
@@ -352,7 +352,7 @@ def test_a_failure_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     browser.step(2)
     browser.take()
     assert browser.take() == {"type": "failed", "message": "no memory"}
-    assert not browser.session.has_work
+    assert not browser.session.has_work()
 
 
 def _fail(_: object) -> None:

@@ -50,6 +50,10 @@ def run(args: argparse.Namespace) -> int:
     write(args.output, image, metadata, layers=layers)
     error = f"relMSE {metadata['error']:.2g}" if "error" in metadata else "relMSE unknown"
     height, width, _ = image.shape
-    facts = f"{width}x{height}", f"{metadata['spp']} spp", f"{len(seeds(metadata))} seeds", error
+    facts = f"{width}x{height}", f"{metadata['spp']} spp", _count(seeds(metadata)), error
     print("  ".join(facts), args.output, sep="\n")
     return 0
+
+
+def _count(seeds: list[str]) -> str:
+    return "1 seed" if len(seeds) == 1 else f"{len(seeds)} seeds"

@@ -50,6 +50,13 @@ class _Save(NamedTuple):
     exposure: float
 
 
+class _Step(NamedTuple):
+    """Something to do; what is ``urgent`` is waited for."""
+
+    do: Callable[[], None]
+    urgent: bool = True
+
+
 class Session:
     """What one browser is shown.
 
@@ -139,11 +146,13 @@ class Session:
 
     # --- the render thread ------------------------------------------------------------------------
 
-    @property
-    def has_work(self) -> bool:
-        """Whether :meth:`step` would do anything."""
+    def has_work(self, *, urgent: bool = False) -> bool:
+        """Whether :meth:`step` would do anything; if ``urgent``, more than refine what is seen."""
         with self._lock:
-            return len(self._messages) < MAX_WAITING and self._next_step() is not None
+            if len(self._messages) >= MAX_WAITING:
+                return False
+            step = self._next_step()
+            return step is not None and (step.urgent or not urgent)
 
     def step(self) -> None:
         """Do what waits first: heed a wish, send a frame, or take some more samples."""
@@ -151,7 +160,7 @@ class Session:
             step = self._next_step()
         try:
             if step:
-                step()
+                step.do()
         except ValueError as error:
             self._tell({"type": "refused", "number": self._number, "message": str(error)})
         except Exception as error:  # whatever it is, other sessions go on
@@ -159,22 +168,24 @@ class Session:
             self._tell({"type": "failed", "message": str(error) or type(error).__name__})
         self._ready()
 
-    def _next_step(self) -> Callable[[], None] | None:
+    def _next_step(self) -> _Step | None:
         """What is to be done next, if anything is."""
         if self._view is not None:
-            return self._change_view
+            return _Step(self._change_view)
         if self._show is None:
             return None
-        return partial(self._save, self._show) if self._saves else self._next_of(self._show)
+        return _Step(partial(self._save, self._show)) if self._saves else self._next_of(self._show)
 
-    def _next_of(self, show: Show) -> Callable[[], None] | None:
+    def _next_of(self, show: Show) -> _Step | None:
         """Frames first, then what has no samples yet, paths before further samples."""
         render = show.next_render(paused=self._paused)
         if (half := show.next_stale(self._frames.keys())) is not None:
-            return partial(self._send_frame, show, half)
+            return _Step(partial(self._send_frame, show, half))
         if (render is None or render.spp) and (half := show.next_untold()) is not None:
-            return partial(self._tell_paths, show, half)
-        return None if render is None else partial(show.advance, render)
+            return _Step(partial(self._tell_paths, show, half))
+        if render is None:
+            return None
+        return _Step(partial(show.advance, render), urgent=not render.spp)
 
     def _change_view(self) -> None:
         with self._lock:

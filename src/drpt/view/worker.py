@@ -85,9 +85,15 @@ class Worker:
         """Wait for a session with something to do; None at the end."""
         with self._change:
             while not self._stopping:
-                for _ in range(len(self._sessions)):
-                    self._sessions.rotate(-1)
-                    if self._sessions[-1].has_work:
-                        return self._sessions[-1]
+                if session := self._next_in_turn(urgent=True) or self._next_in_turn(urgent=False):
+                    return session
                 self._change.wait()
+        return None
+
+    def _next_in_turn(self, *, urgent: bool) -> Session | None:
+        for session in self._sessions:
+            if session.has_work(urgent=urgent):
+                self._sessions.remove(session)
+                self._sessions.append(session)
+                return session
         return None
