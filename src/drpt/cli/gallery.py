@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         backend.load()
     plan = course_plan(QUICK_SIZE if args.quick else SIZE)
     with (
-        interrupts_noted() as request,
+        interrupts_noted("this picture") as request,
         _step_bar(steps(plan)) as on_step,
         suppress(KeyboardInterrupt),
     ):

@@ -29,8 +29,8 @@ class Request:
 
 
 @contextmanager
-def interrupts_noted() -> Iterator[Request]:
-    """Note the first signal, and say so; leave the program at the second.
+def interrupts_noted(after: str = "this pass") -> Iterator[Request]:
+    """Note the first signal, and say ``after`` what it stops; leave the program at the second.
 
     Signals that were ignored stay so, as Ctrl-C is in what a script runs in the background.
     """
@@ -39,7 +39,7 @@ def interrupts_noted() -> Iterator[Request]:
     def note(number: int, _: FrameType | None) -> None:
         if request.signal is None:
             request.signal = signal.Signals(number)
-            say("stopping after this pass; once more stops at once")
+            say(f"stopping after {after}; once more stops at once")
         elif number == signal.SIGINT:
             sys.exit(request.status)
         else:
