@@ -183,7 +183,7 @@ class Rendering:
             sums = self._trace(self.launcher, pixel, range(number, number + 1))
         return np.asarray(sums.radiance[0, 0])
 
-    def paths(self, column: int, row: int, count: int, first: int = 0) -> Vertices:
+    def vertices(self, column: int, row: int, count: int, first: int = 0) -> Vertices:
         """Vertices of the paths of ``count`` samples of a pixel, the same that the passes trace.
 
         What they contribute adds up to the radiance of :meth:`sample`; see

@@ -22,7 +22,7 @@ ROUNDING = 2e-3
 
 def recorded(scene: drpt.Scene, mode: str) -> Vertices:
     column, row = scene.camera.width // 2, 2 * scene.camera.height // 3
-    return drpt.Rendering(scene, mode=mode).paths(column, row, COUNT)
+    return drpt.Rendering(scene, mode=mode).vertices(column, row, COUNT)
 
 
 @pytest.mark.parametrize("mode", drpt.Mode)
@@ -42,7 +42,7 @@ def test_contributions_add_up_to_the_sample(name: str, spp: int, bounces: int, m
     column, row = scene.camera.width // 2, 2 * scene.camera.height // 3
     rendering = drpt.Rendering(scene, spp, bounces, mode)
     first = 5
-    totals = rendering.paths(column, row, COUNT // 4, first).contribution.sum(axis=0)
+    totals = rendering.vertices(column, row, COUNT // 4, first).contribution.sum(axis=0)
     samples = [rendering.sample(column, row, first + k) for k in range(COUNT // 4)]
     assert totals == pytest.approx(np.array(samples), rel=SUMMATION)
 
@@ -70,7 +70,7 @@ def test_a_path_that_ended_stays_ended_and_adds_nothing() -> None:
 
 def test_light_that_arrives_was_not_blocked() -> None:
     scene = drpt.load_scene("cornell-box")
-    found = drpt.Rendering(scene, mode="explicit").paths(90, 230, COUNT)  # beside the small box
+    found = drpt.Rendering(scene, mode="explicit").vertices(90, 230, COUNT)  # beside the small box
     lamp = next(n for n, shape in enumerate(scene.shapes) if shape.is_light)
     looked = found.light_shape != NONE
     assert set(found.light_shape[looked]) == {lamp}
@@ -96,15 +96,15 @@ def test_shapes_are_those_of_the_scene() -> None:
     ]
     camera = drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 60, 9, 9)
     rendering = drpt.Rendering(drpt.Scene(camera=camera, shapes=shapes), 16, 2)
-    assert set(rendering.paths(4, 4, 16).shape[0]) == {1}
-    assert set(rendering.paths(0, 4, 16).shape[0]) == {2}
-    assert set(rendering.paths(0, 4, 16).light_shape[0]) == {0}
+    assert set(rendering.vertices(4, 4, 16).shape[0]) == {1}
+    assert set(rendering.vertices(0, 4, 16).shape[0]) == {2}
+    assert set(rendering.vertices(0, 4, 16).light_shape[0]) == {0}
 
 
 def test_a_scene_without_light_has_no_vertices() -> None:
     dark = drpt.Sphere((0, 0, 0), 1, material=drpt.Diffuse(0.5))
     camera = drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 60, 9, 9)
-    found = drpt.Rendering(drpt.Scene(camera=camera, shapes=[dark])).paths(4, 4, 3)
+    found = drpt.Rendering(drpt.Scene(camera=camera, shapes=[dark])).vertices(4, 4, 3)
     assert found.reached.shape == (0, 3)
     assert found.point.shape == (0, 3, 3)
 
@@ -123,4 +123,4 @@ def test_what_is_out_of_range_is_named(arguments: tuple[int, ...], words: str) -
     camera = drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 60, 9, 9)
     scene = drpt.Scene(camera=camera, shapes=[drpt.Sphere((0, 0, 0), 1, radiance=1)])
     with pytest.raises(ValueError, match=words):
-        drpt.Rendering(scene).paths(*arguments)
+        drpt.Rendering(scene).vertices(*arguments)

@@ -163,7 +163,7 @@ class Show:
         self._untold.remove(half)
         column, row = self.state.pixel
         count = min(self.state.paths, self.state.spp)
-        paths = describe_paths(self.scene, self.halves[half].rendering.paths(column, row, count))
+        paths = describe_paths(self.scene, self.halves[half].rendering.vertices(column, row, count))
         return {
             "type": "pixel",
             "number": self.number,
