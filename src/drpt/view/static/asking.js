@@ -1,8 +1,13 @@
 // @ts-check
-/** Asking the server for the view: at most once a frame, always for the newest state. */
+/**
+ * Asking the server for the view: always for the newest state, and not before the last one has
+ * been seen, so that a slider that is dragged shows something on its way.
+ */
 
 /** What changes the picture, beside what is told about it. */
 const PICTURE = ["scene", "halves", "edits", "camera", "seed", "difference"];
+/** How long, in milliseconds, a newer state waits for the picture of the last one. */
+const PATIENCE = 400;
 
 export class Asking {
   /**
@@ -21,6 +26,9 @@ export class Asking {
     this.accepted = null;
     this.last = null;
     this.scheduled = false;
+    /** The halves of which no picture has come since it was asked for, and when that was. */
+    this.unseen = new Set();
+    this.askedAt = 0;
     view.onChange(() => this.schedule());
   }
 
@@ -28,7 +36,18 @@ export class Asking {
   again() {
     this.last = null;
     this.sent.clear();
+    this.unseen.clear();
     this.schedule();
+  }
+
+  /** A picture of a half has come. */
+  arrived({ half, number }) {
+    if (number >= this.number) this.unseen.delete(half);
+  }
+
+  get #waits() {
+    const late = performance.now() > this.askedAt + PATIENCE;
+    return this.connection.isBusy || (this.unseen.size > 0 && !late);
   }
 
   /** Ask for what is new in the next animation frame. */
@@ -38,7 +57,7 @@ export class Asking {
     this.scheduled = true;
     requestAnimationFrame(() => {
       this.scheduled = false;
-      if (this.connection.isBusy) this.schedule();
+      if (this.#waits) this.schedule();
       else this.#ask();
     });
   }
@@ -57,6 +76,7 @@ export class Asking {
   /** The server has refused a view: return the state to go back to, if nothing newer is asked. */
   refuse(number) {
     this.#answered(number);
+    this.unseen.clear();
     if (this.sent.size || this.view.state !== this.last) return null;
     this.last = this.accepted;
     return this.accepted;
@@ -77,6 +97,9 @@ export class Asking {
     this.sent.set(++this.number, state);
     this.connection.send({ type: "view", number: this.number, state });
     const text = (of) => JSON.stringify(PICTURE.map((key) => of[key]));
-    if (!before || text(before) !== text(state)) this.asked(this.number);
+    if (before && text(before) === text(state)) return;
+    this.unseen = new Set(state.halves.keys());
+    this.askedAt = performance.now();
+    this.asked(this.number);
   }
 }

@@ -4,7 +4,7 @@
 import { draw } from "./dom.js";
 import { SIDES, power } from "./format.js";
 
-const LEFT = 46;
+const LEFT = 50;
 const RIGHT = 300;
 const TOP = 8;
 const BOTTOM = 160;
@@ -35,15 +35,25 @@ export class Chart {
     const points = curves.flatMap((curve, half) =>
       KINDS.flatMap((kind) => curve.filter((h) => h[kind] > 0).map((h) => ({ half, kind, h }))),
     );
-    const x = axis(points.map(({ h }) => h.seconds), LEFT, RIGHT);
-    const y = axis(points.map(({ h, kind }) => h[kind]), BOTTOM, TOP);
+    const x = axis(
+      points.map(({ h }) => h.seconds),
+      LEFT,
+      RIGHT,
+    );
+    const y = axis(
+      points.map(({ h, kind }) => h[kind]),
+      BOTTOM,
+      TOP,
+    );
     this.svg.replaceChildren(
       ...gridX(x),
       ...gridY(y),
       ...curves.flatMap((curve, half) => KINDS.map((kind) => line(curve, half, kind, x, y))),
     );
     const last = points.at(-1);
-    const text = last ? `relMSE ${last.h[last.kind].toExponential(1)} after ${last.h.seconds} s` : "";
+    const text = last
+      ? `relMSE ${last.h[last.kind].toExponential(1)} after ${last.h.seconds} s`
+      : "";
     this.svg.setAttribute("aria-label", `Error against time, both logarithmic. ${text}`);
   }
 }
@@ -79,8 +89,8 @@ function gridY({ powers, atPower }) {
       draw("text", { x: LEFT - 6, y: y + 4, "text-anchor": "end" }, power(exponent)),
     ];
   });
-  const turn = `rotate(-90 10 ${(TOP + BOTTOM) / 2})`;
-  const middle = { x: 10, y: (TOP + BOTTOM) / 2, "text-anchor": "middle", transform: turn };
+  const turn = `rotate(-90 9 ${(TOP + BOTTOM) / 2})`;
+  const middle = { x: 9, y: (TOP + BOTTOM) / 2, "text-anchor": "middle", transform: turn };
   return [...lines, draw("text", middle, "relMSE")];
 }
 

@@ -20,9 +20,9 @@ export function pack(r, g, b) {
 
 export const MAGENTA = pack(255, 0, 255);
 
-/** From too dark to too bright, told apart by every kind of colour vision. */
+/** From too dark to too bright, told apart by every colour vision; light: ColorBrewer's RdBu. */
 const STOPS = {
-  light: ["053061", "2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b", "67001f"], // ColorBrewer's RdBu
+  light: ["053061", "2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b", "67001f"],
   dark: ["c4e4ff", "3aa0ff", "12508f", "0a0a0a", "8a4a00", "ff8c1a", "ffe2b8"],
 };
 export const STEPS = 255;
@@ -32,7 +32,8 @@ export const STEPS = 255;
  * @param {"light" | "dark"} theme the middle is white or black
  */
 export function diverging(theme) {
-  const stops = STOPS[theme].map((hex) => [0, 2, 4].map((at) => parseInt(hex.slice(at, at + 2), 16)));
+  const channels = (hex) => [0, 2, 4].map((at) => parseInt(hex.slice(at, at + 2), 16));
+  const stops = STOPS[theme].map(channels);
   return Uint32Array.from({ length: STEPS }, (_, step) => {
     const place = (step / (STEPS - 1)) * (stops.length - 1);
     const low = Math.min(Math.floor(place), stops.length - 2);

@@ -54,7 +54,8 @@ function addSampling(view) {
 function addComparison(view) {
   const compare = byId("compare");
   compare.addEventListener("change", () => view.compare(compare.checked));
-  const choices = [...document.getElementsByName("difference")];
+  const selector = "input[name=difference]";
+  const choices = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll(selector)]);
   for (const input of choices) {
     input.addEventListener("change", () => view.change({ difference: input.value }));
   }

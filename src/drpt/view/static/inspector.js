@@ -104,7 +104,9 @@ export class Inspector {
     const names = halves.length === 2 ? SIDES : ["radiance"];
     const heads = names.map((name) => make("th", { scope: "col", className: name }, name));
     const rows = CHANNELS.map((channel, c) =>
-      make("tr", {},
+      make(
+        "tr",
+        {},
         make("th", { scope: "row" }, channel),
         ...values.map((value) => make("td", {}, this.#isCurrent(value) ? cell(value, c) : "–")),
       ),
@@ -144,9 +146,13 @@ export class Inspector {
     table.hidden = !path;
     if (!path) return;
     const { exposure } = this.view.look;
-    const heads = ["", "met", "throughput", "adds"].map((name) => make("th", { scope: "col" }, name));
+    const heads = ["", "met", "throughput", "adds"].map((name) =>
+      make("th", { scope: "col" }, name),
+    );
     const rows = path.vertices.map((vertex, i) => vertexRow(vertex, i, exposure));
-    const total = make("tr", { className: "total" },
+    const total = make(
+      "tr",
+      { className: "total" },
       make("th", { scope: "row", colSpan: 3 }, "radiance of the path"),
       triple(path.radiance, exposure),
     );
@@ -181,7 +187,9 @@ function cell({ mean, standard_error: error }, channel) {
 function vertexRow({ event, shape, throughput, contribution, light }, index, exposure) {
   const lit = light ? (light.visible ? "light seen" : "light hidden") : "";
   const what = shape === null ? event : `${event} ${shapeName(shape)}`;
-  return make("tr", {},
+  return make(
+    "tr",
+    {},
     make("th", { scope: "row" }, String(index + 1)),
     make("td", { className: "met" }, make("span", {}, what), make("small", {}, lit)),
     triple(throughput, 0),

@@ -64,6 +64,7 @@ class Page {
       this.picture.take(header, buffer, start);
       this.chart.add(header);
       this.busy.arrived(header.number);
+      this.asking.arrived(header);
     }
     this.schedule();
   }
@@ -81,7 +82,8 @@ class Page {
     this.asking = new Asking(this.view, this.connection, (number) => this.busy.wait(number));
     this.inspector = new Inspector(this.view);
     addControls(this.view, hello);
-    for (const kind of ["light", "surface"]) new ShapeEditor(byId(kind), this.view, kind);
+    new ShapeEditor(byId("light"), this.view, "light");
+    new ShapeEditor(byId("surface"), this.view, "surface");
     addDivider(byId("divider"), this.view);
     this.#addPicture(byId("picture"));
     this.#addTools();
@@ -120,6 +122,7 @@ class Page {
     byId("restart").addEventListener("click", restart);
     byId("reset").addEventListener("click", () => this.view.replace(this.base, LOOK));
     byId("copy").addEventListener("click", () => this.#copyLink());
+    byId("copy").hidden = !navigator.clipboard; // as it is where the page is not from this machine
     addShortcuts(this.view, { pause, restart });
     for (const button of document.querySelectorAll("[data-save]")) {
       button.addEventListener("click", () => this.#save(button.getAttribute("data-save")));

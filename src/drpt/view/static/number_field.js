@@ -39,7 +39,9 @@ export class NumberField {
 
   #makeSlider(name) {
     const slider = make("input", { type: "range", "aria-label": name });
-    slider.addEventListener("input", () => this.settings.write(this.#valueAt(slider.valueAsNumber)));
+    slider.addEventListener("input", () =>
+      this.settings.write(this.#valueAt(slider.valueAsNumber)),
+    );
     return slider;
   }
 

@@ -25,7 +25,9 @@ export function drawOverlay(svg, { pixel, paths, chosen, scale, choose }) {
   svg.replaceChildren(
     ...(pixel ? [frame(pixel, scale)] : []),
     ...others,
-    ...(path ? [...lights(path, scale), ray(path, scale, chosen, choose), ...marks(path, scale)] : []),
+    ...(path
+      ? [...lights(path, scale), ray(path, scale, chosen, choose), ...marks(path, scale)]
+      : []),
   );
   svg.querySelectorAll(".ray")[others.length]?.classList.add("chosen");
 }

@@ -42,7 +42,10 @@ export class Picture {
       this.halves = [];
     }
     const size = 3 * width * height;
-    const arrays = images.map((name, i) => [name, new Uint16Array(buffer, start + 2 * size * i, size)]);
+    const arrays = images.map((name, i) => [
+      name,
+      new Uint16Array(buffer, start + 2 * size * i, size),
+    ]);
     this.halves[half] = Object.fromEntries(arrays);
   }
 
@@ -68,7 +71,9 @@ export class Picture {
     const images = this.halves[half];
     if (!images) return;
     const values = images.difference ?? images.radiance;
-    const colour = images.difference ? this.#differenceColour(scale) : this.#radianceColour(exposure);
+    const colour = images.difference
+      ? this.#differenceColour(scale)
+      : this.#radianceColour(exposure);
     const { width, height } = this.canvas;
     for (let y = 0; y < height; y++) {
       for (let x = from; x < to; x++) {

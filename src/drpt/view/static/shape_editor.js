@@ -11,7 +11,7 @@ const CHANNELS = ["Red", "Green", "Blue"];
 /** How much smaller and larger than it was a sphere is made by its slider. */
 const RADII = [1 / 16, 4];
 /** How far a sphere is moved by its sliders, as a part of its distance from the camera. */
-const REACH = 0.5;
+const REACH = 0.25;
 const EXPONENTS = /** @type {[number, number]} */ ([1, 1e5]);
 const FIRST_EXPONENT = 50;
 
@@ -74,18 +74,28 @@ export class ShapeEditor {
       read: () => this.shape[key]?.[i],
       write: (value) => edit({ [key]: this.shape[key].with(i, value) }),
     });
-    const own = (key) => ({ read: () => this.shape[key], write: (value) => edit({ [key]: value }) });
-    this.radius = new NumberField({
-      label: "Radius", range: [0.1, 1], logarithmic: true, ...own("radius"),
+    const own = (key) => ({
+      read: () => this.shape[key],
+      write: (value) => edit({ [key]: value }),
     });
-    this.center = AXES.map((label, i) =>
-      new NumberField({ label, range: [0, 1], ...component("center", i) }),
+    this.radius = new NumberField({
+      label: "Radius",
+      range: [0.1, 1],
+      logarithmic: true,
+      ...own("radius"),
+    });
+    this.center = AXES.map(
+      (label, i) => new NumberField({ label, range: [0, 1], ...component("center", i) }),
     );
-    this.albedo = CHANNELS.map((label, i) =>
-      new NumberField({ label, range: [0, 1], step: 0.01, ...component("albedo", i) }),
+    this.albedo = CHANNELS.map(
+      (label, i) =>
+        new NumberField({ label, range: [0, 1], step: 0.01, ...component("albedo", i) }),
     );
     this.exponent = new NumberField({
-      label: "Exponent", range: EXPONENTS, logarithmic: true, ...own("exponent"),
+      label: "Exponent",
+      range: EXPONENTS,
+      logarithmic: true,
+      ...own("exponent"),
     });
     this.fields = [this.radius, ...this.center, ...this.albedo, this.exponent];
   }
@@ -157,8 +167,8 @@ function nameOf({ index, kind, faces }) {
   return `${shapeName(index)} · ${kind === "mesh" ? `mesh of ${faces} faces` : kind}`;
 }
 
-/** The next 1, 2 or 5 times a power of ten. */
+/** The next 1, 2, 2.5 or 5 times a power of ten. */
 function rounded(value) {
   const unit = 10 ** Math.floor(Math.log10(value));
-  return unit * [1, 2, 5, 10].find((factor) => factor * unit >= value);
+  return unit * [1, 2, 2.5, 5, 10].find((factor) => factor * unit >= value);
 }

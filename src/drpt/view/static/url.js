@@ -1,6 +1,8 @@
 // @ts-check
 /** The state and the look as the hash of the URL, which a link reproduces. */
 
+import { SIDES } from "./format.js";
+
 /** What the picture is shown with; the server never hears of it. */
 export const LOOK = {
   exposure: 0, // stops
@@ -16,7 +18,6 @@ export const LOOK = {
 const NUMBERS = { state: ["spp", "seed", "paths"], look: ["exposure", "scale", "divider"] };
 const CHOICES = ["path", "light", "surface"];
 const CAMERA = ["azimuth", "elevation", "zoom"];
-const SIDES = ["left", "right"];
 const EDIT = /^shape(\d+)\.(radius|center|albedo|exponent)$/;
 
 /**

@@ -1,5 +1,5 @@
 // @ts-check
-/** What is looked at: the state, which is asked of the server, and the look, which is the page's own. */
+/** What is looked at: the state, asked of the server, and the look, which is the page's own. */
 
 import { LOOK } from "./url.js";
 
