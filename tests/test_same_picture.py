@@ -81,8 +81,9 @@ def test_bounces_in_a_loop_and_unrolled(mode: str, monkeypatch: pytest.MonkeyPat
 def test_triangles_in_embree_and_unrolled(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """And spheres in a loop."""
     plain = drpt.render(small_scene(), SPP, BOUNCES, mode)
-    monkeypatch.setattr("drpt.kernel.primitives.UNROLL_LIMIT", 0)
-    monkeypatch.setattr("drpt.kernel.device_scene.UNROLL_LIMIT", 0)
+    monkeypatch.setattr("drpt.kernel.primitives.FACET_LIMIT", 0)
+    monkeypatch.setattr("drpt.kernel.primitives.LIGHT_FACET_LIMIT", 0)
+    monkeypatch.setattr("drpt.kernel.device_scene.SPHERE_LIMIT", 0)
     prepare.cache_clear()
     assert_same(drpt.render(small_scene(), SPP, BOUNCES, mode), plain)
 

@@ -11,7 +11,7 @@ import pytest
 import drpt
 from drpt.kernel.estimator import Features, Mode, feature_facts, layout_facts
 from drpt.kernel.launch import prepare
-from drpt.kernel.primitives import UNROLL_LIMIT, make_primitives
+from drpt.kernel.primitives import FACET_LIMIT, SPHERE_LIMIT, make_primitives
 from tests.conftest import TYPES
 
 if TYPE_CHECKING:
@@ -32,11 +32,11 @@ LAMP = drpt.Sphere((0, 0, 7), 1, radiance=1)
 PANEL = drpt.Mesh(CORNERS, [[0, 1, 2]], radiance=1)
 
 HOUSE = ROOM, TRIANGLE, LAMP
-MANY = UNROLL_LIMIT + 1
+MANY = FACET_LIMIT + 1
 LAYERS = np.concatenate([np.add(CORNERS, (0, 0, z)) for z in range(MANY)])
 STRIPES = drpt.Mesh(LAYERS, np.arange(3 * MANY).reshape(-1, 3), material=DIFFUSE)
 PANELS = drpt.Mesh(LAYERS, STRIPES.faces, radiance=1)
-BALLS = [drpt.Sphere((3 * x, 0, 0), 1, material=DIFFUSE) for x in range(MANY)]
+BALLS = [drpt.Sphere((3 * x, 0, 0), 1, material=DIFFUSE) for x in range(SPHERE_LIMIT + 1)]
 IMPLICIT, EXPLICIT = {"mode": "implicit"}, {"mode": "explicit"}
 
 COURSE_NAMES = {
@@ -211,9 +211,9 @@ def test_every_feature_is_told() -> None:
         ("merged_triangles", (True, "6 of 7 facets are of several triangles"), [*HOUSE], {}),
         ("solids", (True, "1 convex body of 6 facets"), [*HOUSE], {}),
         ("solids", (False, "no facets are a convex body"), [TRIANGLE, LAMP], {}),
-        ("mesh", (False, "7 facets, not more than 64 of a kind"), [*HOUSE], {}),
-        ("mesh", (True, "65 triangles, more than 64"), [STRIPES, LAMP], {}),
-        ("mesh", (True, "65 triangles, more than 64"), [BALL, PANELS], {}),
+        ("mesh", (False, "7 facets, not more than 96, or 24 that emit"), [*HOUSE], {}),
+        ("mesh", (True, "97 triangles, more than 96, or 24 that emit"), [STRIPES, LAMP], {}),
+        ("mesh", (True, "97 triangles, more than 96, or 24 that emit"), [BALL, PANELS], {}),
         ("sphere_tree", (False, "2 spheres, not more than 64"), [BALL, LAMP], {}),
         ("sphere_tree", (True, "66 spheres, more than 64"), [*BALLS, LAMP], {}),
         ("facet_shadows", (True, "1 of 7 facets can stand before a light"), [*HOUSE], {}),

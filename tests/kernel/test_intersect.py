@@ -14,7 +14,7 @@ from drpt.kernel.camera import Ray
 from drpt.kernel.estimator import Mode
 from drpt.kernel.intersect import closest_hit, occluded
 from drpt.kernel.launch import make_launcher
-from drpt.kernel.primitives import UNROLL_LIMIT, make_primitives
+from drpt.kernel.primitives import FACET_LIMIT, SPHERE_LIMIT, make_primitives
 from tests.conftest import TYPES, to_host
 from tests.oracle import geometry
 from tests.oracle.arrays import dot, normalize, sample_uniform_sphere
@@ -148,15 +148,15 @@ SCENES: dict[str, Callable[[np.random.Generator], list[Shape]]] = {
     "one sphere": lambda rng: [*spheres(rng, 1)],
     "spheres": lambda rng: [*spheres(rng, 8)],
     "nested spheres": lambda rng: [*nested(rng)],
-    "many spheres": lambda rng: [*spheres(rng, UNROLL_LIMIT + 1)],
+    "many spheres": lambda rng: [*spheres(rng, SPHERE_LIMIT + 1)],
     "triangles": lambda rng: [*triangles(rng, 12)],
     "smooth triangles": lambda rng: [*triangles(rng, 8, smooth=True)],
-    "many triangles": lambda rng: [*triangles(rng, UNROLL_LIMIT + 1)],
-    "many smooth triangles": lambda rng: [*triangles(rng, UNROLL_LIMIT + 1, smooth=True)],
+    "many triangles": lambda rng: [*triangles(rng, FACET_LIMIT + 1)],
+    "many smooth triangles": lambda rng: [*triangles(rng, FACET_LIMIT + 1, smooth=True)],
     "mixed": lambda rng: [*triangles(rng, 6), *spheres(rng, 5), *box(rng)],
     "many of all": lambda rng: [
-        *triangles(rng, UNROLL_LIMIT + 1, smooth=True),
-        *spheres(rng, UNROLL_LIMIT + 1),
+        *triangles(rng, FACET_LIMIT + 1, smooth=True),
+        *spheres(rng, SPHERE_LIMIT + 1),
     ],
 }
 
@@ -460,7 +460,7 @@ def test_a_needle_is_hit_on_its_axis_and_missed_beside_it(name: str) -> None:
         [[0.0, -width, 0], [1.0, 0, 0], [0.0, width, 0]], [[0, 1, 2]], material=dull(0)
     )
     away = (0.0, 0.0, -9.0)
-    others = [*triangles(rng, UNROLL_LIMIT + 1)] if name != "one needle" else [*spheres(rng, 1)]
+    others = [*triangles(rng, FACET_LIMIT + 1)] if name != "one needle" else [*spheres(rng, 1)]
     world = World(needle, *(moved(shape, away) for shape in others))
     n = 4096
     x = rng.uniform(0.05, 0.4, n)

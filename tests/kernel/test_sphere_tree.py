@@ -13,7 +13,7 @@ from drpt.kernel.camera import Ray
 from drpt.kernel.estimator import Mode
 from drpt.kernel.intersect import closest_hit, occluded
 from drpt.kernel.launch import make_launcher
-from drpt.kernel.primitives import UNROLL_LIMIT
+from drpt.kernel.primitives import SPHERE_LIMIT
 from drpt.kernel.sphere_tree import arrange, boxes_around
 from tests.conftest import TYPES, to_device, to_host
 from tests.oracle.arrays import normalize, sample_uniform_sphere
@@ -104,7 +104,7 @@ def rays(around: float) -> tuple[Floats, Floats]:
 
 
 @pytest.mark.parametrize("around", [1.0, 5.0])
-@pytest.mark.parametrize("count", [UNROLL_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [SPHERE_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
 def test_closest_hits_are_those_of_all_spheres(count: int, around: float) -> None:
     balls, (origins, directions) = Balls(count), rays(around)
     number, distance = balls.closest(origins, directions)
@@ -116,7 +116,7 @@ def test_closest_hits_are_those_of_all_spheres(count: int, around: float) -> Non
     assert distance[hit] == pytest.approx(t[hit], abs=OUTLINE)
 
 
-@pytest.mark.parametrize("count", [UNROLL_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [SPHERE_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
 def test_shadows_are_those_of_all_spheres_but_the_light(count: int) -> None:
     balls, (origins, _) = Balls(count), rays(1.0)
     for light in (0, 4):
@@ -139,10 +139,10 @@ def test_shadows_are_those_of_all_spheres_but_the_light(count: int) -> None:
 
 
 def test_of_coincident_spheres_the_last_one_counts() -> None:
-    balls = Balls(UNROLL_LIMIT + 9, lights=1, same=True)
+    balls = Balls(SPHERE_LIMIT + 9, lights=1, same=True)
     origins = balls.centers[0] + 3 * sample_uniform_sphere(np.random.default_rng(4), 64)
     number, _ = balls.closest(origins, (balls.centers[0] - origins) / 3)
-    assert (number == UNROLL_LIMIT + 8).all()
+    assert (number == SPHERE_LIMIT + 8).all()
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 
 from drpt.kernel.light_tree import LightTree
 from drpt.kernel.mesh import TriangleMesh
-from drpt.kernel.primitives import LUMINANCE, UNROLL_LIMIT
+from drpt.kernel.primitives import LUMINANCE, SPHERE_LIMIT
 from drpt.kernel.solids import edge_owners
 from drpt.kernel.sphere_tree import SphereTree
 
@@ -115,7 +115,7 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
 
     triangles = primitives.triangles
     in_light_mesh = primitives.light_corners[len(primitives.light_facets) :]
-    few_spheres = len(primitives.spheres) <= UNROLL_LIMIT
+    few_spheres = len(primitives.spheres) <= SPHERE_LIMIT
     first = primitives.first_sphere
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
     solids = primitives.solids

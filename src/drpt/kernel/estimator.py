@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from drpt.kernel.primitives import UNROLL_LIMIT
+from drpt.kernel.primitives import FACET_LIMIT, LIGHT_FACET_LIMIT, SPHERE_LIMIT
 
 if TYPE_CHECKING:
     from drpt.kernel.primitives import Primitives
@@ -213,18 +213,19 @@ def _facet_facts(primitives: Primitives) -> dict[str, Fact]:
 
 def _hierarchy_facts(primitives: Primitives) -> dict[str, Fact]:
     lit, spheres = _lit(primitives), len(primitives.spheres)
-    facets = len(primitives.facets) + len(primitives.light_facets)
-    triangles = len(primitives.planes) - facets
+    facets, emitting = len(primitives.facets), len(primitives.light_facets)
+    triangles = len(primitives.planes) - facets - emitting
+    limits = f"{FACET_LIMIT}, or {LIGHT_FACET_LIMIT} that emit"
     return {
         "mesh": _decide(
-            f"{triangles} triangles, more than {UNROLL_LIMIT}",
+            f"{triangles} triangles, more than {limits}",
             *lit,
-            (triangles > 0, f"{_number(facets, 'facet')}, not more than {UNROLL_LIMIT} of a kind"),
+            (triangles > 0, f"{_number(facets + emitting, 'facet')}, not more than {limits}"),
         ),
         "sphere_tree": _decide(
-            f"{spheres} spheres, more than {UNROLL_LIMIT}",
+            f"{spheres} spheres, more than {SPHERE_LIMIT}",
             *lit,
-            (spheres > UNROLL_LIMIT, f"{_number(spheres, 'sphere')}, not more than {UNROLL_LIMIT}"),
+            (spheres > SPHERE_LIMIT, f"{_number(spheres, 'sphere')}, not more than {SPHERE_LIMIT}"),
         ),
     }
 

@@ -27,9 +27,13 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-UNROLL_LIMIT = 64
-"""Up to so many facets, emitting facets and spheres are tested one by one in the kernel."""
-MERGE_LIMIT = 4 * UNROLL_LIMIT
+FACET_LIMIT = 96
+"""Up to so many facets that reflect are met one by one in the kernel: where Embree is as fast."""
+LIGHT_FACET_LIMIT = 24
+"""Likewise of those that emit."""
+SPHERE_LIMIT = 64
+"""Likewise of spheres, where a tree is as fast."""
+MERGE_LIMIT = 4 * FACET_LIMIT
 """Meshes of more triangles than this are not searched for coplanar neighbours."""
 DIFFUSE = -1.0
 """Stands for the exponent of a diffuse surface."""
@@ -161,7 +165,7 @@ def make_primitives(shapes: tuple[Shape, ...]) -> Primitives:
     lit_triangles = _lights([part for part in lit if isinstance(part.shape, Mesh)], 3, 3)
     corners = np.concatenate([np.empty((0, 3, 3)), *map(_triangles, (*flat, *smooth))])
     light_corners = lit_triangles.primitives
-    few_lights = len(light_corners) <= UNROLL_LIMIT
+    few_lights = len(light_corners) <= LIGHT_FACET_LIMIT
     return Primitives(
         origin=origin,
         planes=_planes(np.concatenate([corners, light_corners])),
@@ -218,7 +222,7 @@ def _unrolled(flat: list[_Part], smooth: list[_Part]) -> tuple[list[_Part], tupl
         return flat, ()
     merged = [part._replace(primitives=merge_coplanar(part.primitives)) for part in flat]
     polygons = [polygon for part in (*merged, *smooth) for polygon in part.primitives]
-    if len(polygons) > UNROLL_LIMIT:
+    if len(polygons) > FACET_LIMIT:
         return flat, ()
     return merged, tuple(map(make_facet, polygons))
 
