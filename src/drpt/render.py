@@ -194,12 +194,9 @@ class Rendering:
         count = check_whole("count", count, 1, spp - first)
         with backend.interrupts_put_off():
             launcher = self.launcher
-            from drpt.kernel.launch import prepare
             from drpt.kernel.recording import record
 
-            primitives, _ = prepare(self.settings.scene.shapes, backend.load())
-            samples = range(first, first + count)
-            return record(launcher, primitives, pixel, samples, self.settings.seed)
+            return record(launcher, pixel, range(first, first + count), self.settings.seed)
 
     def _pixel(self, column: int, row: int) -> int:
         camera = self.settings.scene.camera
@@ -467,10 +464,7 @@ def explain(scene: Scene, bounces: int = 3, mode: str = Mode.MIS) -> Explanation
     Raises `ValueError` like :func:`render`.
     """
     rendering = Rendering(scene, bounces=bounces, mode=mode)
-    from drpt.kernel.launch import prepare
-
-    primitives, _ = prepare(scene.shapes, backend.load())
-    what = primitives, bounces, Mode(rendering.settings.mode)
+    what = rendering.launcher.primitives, bounces, Mode(rendering.settings.mode)
     facts = {**feature_facts(*what), **layout_facts(*what)}
     return Explanation(
         features={name: fact.holds for name, fact in facts.items()},

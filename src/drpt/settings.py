@@ -10,6 +10,7 @@ import numpy as np
 
 from drpt.kernel.estimator import Mode
 from drpt.scene import Scene
+from drpt.scene.checks import show
 
 SAMPLERS = ("sobol", "independent")
 MAX_SPP = 2**48
@@ -63,10 +64,9 @@ def check_whole(name: str, value: object, low: int, high: int | None) -> int:
 
 def check_number(name: str, value: object, low: float, high: float) -> float:
     """Return a number in a range, or raise `ValueError`."""
-    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else np.nan
-    if not low <= number <= high:
-        raise refuse(name, value, f"a number from {low:g} to {high:g}")
-    return number
+    if isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high:
+        return float(value)
+    raise refuse(name, value, f"a number from {low:g} to {high:g}")
 
 
 def check_positive(name: str, value: object) -> float:
@@ -103,7 +103,7 @@ def check_switch(name: str, value: object) -> bool:
 
 def refuse(name: str, value: object, allowed: str) -> ValueError:
     """An error that names a setting, its value and what is allowed."""
-    return ValueError(f"{name}: {value!r} is not allowed; it must be {allowed}")
+    return ValueError(f"{name}: {show(value)} is not allowed; it must be {allowed}")
 
 
 def _check_scene(scene: object) -> Scene:

@@ -14,6 +14,7 @@ import drpt
 from drpt.output import read
 from drpt.view.scenes import Scenes
 from drpt.view.session import MAX_FRAMES, MAX_WAITING, ProtocolError, Session
+from drpt.view.show import REFERENCE_SPP
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 SIDE = 12
 # Half floats have 11 bits.
 HALF = 2.0**-11
+# Share of a reference's error in that of 64 independent samples: 2^14 Sobol' points.
+REFERENCE = 64 / REFERENCE_SPP
 MIS = {"mode": "mis", "sampler": "sobol", "bounces": 2}
 PLAIN = {"mode": "explicit", "sampler": "independent", "bounces": 2}
 
@@ -195,15 +198,21 @@ def test_what_is_paused_waits_but_a_change_is_seen() -> None:
     assert browser.session.has_work()
 
 
-def test_the_mean_square_of_the_difference_is_the_measured_error() -> None:
+def test_the_measured_error_is_that_of_the_picture_alone() -> None:
+    """The mean square of what is shown has that of the reference in it."""
     browser = Browser()
     browser.view(halves=[PLAIN], difference="reference", spp=64)
-    frame = browser.next_frame()
-    while "difference" not in frame.header["images"]:
-        frame = browser.next_frame()
-    squares = np.square(frame.images()["difference"].astype(np.float64))
-    assert frame.header["measured"] == pytest.approx(squares.mean(), rel=10 * HALF)
-    assert frame.header["reference_spp"] > 0
+    frames = [browser.next_frame()]
+    while browser.session.has_work():
+        frames.append(browser.next_frame())
+    first, last = (
+        next(frame for frame in order if "difference" in frame.header["images"])
+        for order in (frames, reversed(frames))
+    )
+    squares = np.square(last.images()["difference"].astype(np.float64))
+    assert last.header["reference_spp"] == REFERENCE_SPP
+    assert last.header["measured"] == pytest.approx(squares.mean(), rel=REFERENCE)
+    assert first.header["measured"] < np.square(first.images()["difference"], dtype=float).mean()
 
 
 def test_the_difference_from_the_other_half_is_the_other_s_reversed() -> None:
@@ -355,7 +364,7 @@ def test_a_failure_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not browser.session.has_work()
 
 
-def _fail(_: object) -> None:
+def _fail(*_: object) -> None:
     raise MemoryError("no memory")
 
 
@@ -366,3 +375,84 @@ def test_numbers_that_json_lacks_are_null() -> None:
     header = browser.next_frame().header
     assert header["error"] is None
     assert header["pixel"]["standard_error"] == [None] * 3
+
+
+def test_a_picture_is_saved_when_there_is_one() -> None:
+    browser = Browser()
+    browser.view(halves=[MIS])
+    browser.say("save", what="exr", half=0, exposure=0)
+    frames = 0
+    while True:
+        browser.step()
+        message = browser.session.next_message()
+        if isinstance(message, bytes):
+            header, _ = unpacked(message)
+            if header["type"] == "file":
+                break
+            frames += 1
+    assert frames == 1
+
+
+def test_a_picture_that_cannot_be_saved_leaves_the_view(monkeypatch: pytest.MonkeyPatch) -> None:
+    browser = Browser()
+    browser.view(halves=[MIS])
+    browser.next_frame()
+    monkeypatch.setattr("drpt.view.session.picture_file", _fail)
+    browser.say("save", what="png", half=0, exposure=0)
+    browser.step()
+    assert browser.take() == {"type": "failed", "message": "no memory"}
+    assert browser.next_frame().header["number"] == 1
+
+
+def test_a_view_is_seen_before_the_next() -> None:
+    """As while a slider is dragged, faster than anything is rendered."""
+    browser = Browser()
+    seen = set()
+    for _ in range(200):
+        browser.view(seed=browser.number)
+        browser.step()
+        while (message := browser.session.next_message()) is not None:
+            if isinstance(message, bytes):
+                seen.add(unpacked(message).header["number"])
+                browser.say("drawn")
+    assert len(seen) > 40
+
+
+def test_equal_halves_are_rendered_once() -> None:
+    browser = Browser()
+    browser.view(halves=[MIS, MIS], difference="other", spp=2**20)
+    for _ in range(6):
+        assert not browser.next_frame().images()["difference"].any()
+
+
+def test_shapes_are_told_only_if_they_have_changed() -> None:
+    browser = Browser()
+    told: list[tuple[int, bool]] = []
+    changes: list[dict[str, Any]] = [
+        {},
+        {"seed": 1},
+        {"camera": {"azimuth": 5, "elevation": 0, "zoom": 0}},
+        {"edits": {"0": {"radius": 5}}},
+        {"scene": "furnace", "edits": {}},
+    ]
+    for change in changes:
+        browser.view(**change)
+        while not told or told[-1][0] < browser.number:
+            browser.step()
+            while (message := browser.session.next_message()) is not None:
+                if isinstance(message, str):
+                    scene = json.loads(message)
+                    told.append((scene["number"], "shapes" in scene))
+    assert told == [(1, True), (2, False), (3, False), (4, True), (5, True)]
+
+
+@pytest.mark.parametrize("radiance", [1e-12, 1.0, 1e20])
+def test_no_brightness_is_lost_on_the_way(radiance: float, tmp_path: Path) -> None:
+    ball = drpt.Sphere((0, 0, 0), 1, radiance=radiance)
+    camera = drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 12, 8, 8)
+    drpt.Scene(camera=camera, shapes=[ball]).save(tmp_path / "ball.toml")
+    browser = Browser(str(tmp_path / "ball.toml"))
+    browser.view(halves=[MIS])
+    frame = browser.next_frame()
+    shown = float(frame.images()["radiance"].max()) * 2.0 ** frame.header["stops"]
+    assert shown == pytest.approx(radiance, rel=HALF)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from drpt.cli.status import say
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -29,8 +29,10 @@ class Request:
 
 
 @contextmanager
-def interrupts_noted(after: str = "this pass") -> Iterator[Request]:
-    """Note the first signal, and say ``after`` what it stops; leave the program at the second.
+def interrupts_noted(
+    after: str = "this pass", leave: Callable[[int], object] = sys.exit
+) -> Iterator[Request]:
+    """Note the first signal, and say ``after`` what it stops; at the second, ``leave``.
 
     Signals that were ignored stay so, as Ctrl-C is in what a script runs in the background.
     """
@@ -41,7 +43,7 @@ def interrupts_noted(after: str = "this pass") -> Iterator[Request]:
             request.signal = signal.Signals(number)
             say(f"stopping after {after}; once more stops at once")
         elif number == signal.SIGINT:
-            sys.exit(request.status)
+            leave(request.status)
         else:
             signal.raise_signal(signal.SIGINT)  # which waits for Dr.Jit
 

@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
         backend.load()
         if args.threads is not None:
             backend.set_thread_count(args.threads)
-        with interrupts_noted() as request:
+        with interrupts_noted(leave=os._exit) as request:  # Python would not wait for the renderer
             _serve(worker, listener, request, args)
     return request.status
 

@@ -78,7 +78,7 @@ def first_hits(
         forward = _axis(scene.camera, on_device.types)
 
     def mean(tracer: Tracer) -> NDArray[np.float64]:
-        launcher = Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray=1)
+        launcher = Launcher(tracer, camera, SAMPLERS[sampler], jitter, 1, primitives)
         return _mean(launcher, scene.camera, spp, seed)
 
     far, share, _ = np.moveaxis(mean(_DepthTracer(*estimator, forward)), -1, 0)

@@ -74,6 +74,7 @@ class Launcher:
     sampler: type[Sampler]
     jitter: bool
     paths_per_ray: int
+    primitives: Primitives
 
     def launch(self, pixels: range, samples: range, run: int, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range, in runs of so many after each other.
@@ -177,7 +178,7 @@ def make_launcher(
     tracer = Tracer(device_scene, features, mode, bounces)
     camera = make_camera(scene.camera, primitives.origin, device_scene.types)
     paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
-    return Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray)
+    return Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray, primitives)
 
 
 @lru_cache(maxsize=1)

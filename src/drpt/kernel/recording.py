@@ -62,14 +62,9 @@ class Vertices(NamedTuple):
     light_point: NDArray[np.float64]
 
 
-def record(
-    launcher: Launcher, primitives: Primitives, pixel: int, samples: range, seed: int
-) -> Vertices:
-    """Trace samples of a pixel as a render traces them, and keep their vertices.
-
-    ``primitives`` are those that the launcher has on the device.
-    """
-    tracer, recorder = launcher.tracer, _Recorder(launcher.tracer, primitives)
+def record(launcher: Launcher, pixel: int, samples: range, seed: int) -> Vertices:
+    """Trace samples of a pixel as a render traces them, and keep their vertices."""
+    tracer, recorder = launcher.tracer, _Recorder(launcher.tracer, launcher.primitives)
     path, sampler, own = launcher.single_paths(pixel, samples, seed)
     path = path._replace(
         active=dr.full(tracer.scene.types.Bool, True, len(samples)),

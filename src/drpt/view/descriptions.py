@@ -28,9 +28,11 @@ def hello(scenes: Scenes) -> dict[str, Any]:
     }
 
 
-def describe_scene(show: Show) -> dict[str, Any]:
-    """Return the message about a scene as it is shown."""
-    camera = asdict(show.scene.camera)
+def describe_scene(show: Show, before: Show | None) -> dict[str, Any]:
+    """Return the message about a scene as it is shown; without shapes if they are as before."""
+    camera, shapes = asdict(show.scene.camera), {}
+    if before is None or not show.has_the_shapes_of(before):
+        shapes = {"shapes": [_shape(*numbered) for numbered in enumerate(show.scene.shapes)]}
     return {
         "type": "scene",
         "number": show.number,
@@ -39,7 +41,7 @@ def describe_scene(show: Show) -> dict[str, Any]:
         "width": camera.pop("width"),
         "height": camera.pop("height"),
         "camera": camera,
-        "shapes": [_shape(number, shape) for number, shape in enumerate(show.scene.shapes)],
+        **shapes,
     }
 
 

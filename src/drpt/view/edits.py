@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,12 +18,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.scene import Shape
+    from drpt.scene.checks import Point
     from drpt.scene.model import Material
+
+    _Box: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 OF_SPHERES = ("center", "radius")
 OF_SURFACES = ("albedo", "exponent")
 NEAR = 1e-3
-"""The camera goes around a point that is farther away than this, relative to the scene's size."""
+"""The camera goes around a point that is farther away than this, relative to what it looks at."""
 
 
 def edited(scene: Scene, edits: Mapping[int, Mapping[str, Any]], orbit: Orbit) -> Scene:
@@ -42,7 +45,11 @@ def edited(scene: Scene, edits: Mapping[int, Mapping[str, Any]], orbit: Orbit) -
             shapes[number] = _changed(shapes[number], edit)
         except SceneError as error:
             raise error.within(field) from None
-    return replace(scene, shapes=tuple(shapes), camera=moved(scene, orbit))
+    try:
+        camera = moved(scene, orbit)
+    except SceneError as error:
+        raise error.within("camera") from None
+    return replace(scene, shapes=tuple(shapes), camera=camera)
 
 
 def _changed(shape: Shape, edit: Mapping[str, Any]) -> Shape:
@@ -74,30 +81,46 @@ def moved(scene: Scene, orbit: Orbit) -> Camera:
     eye, up = np.array(camera.eye), np.array(camera.up)
     forward = np.subtract(camera.target, eye)
     forward /= np.linalg.norm(forward)
+    up /= np.linalg.norm(up)
     right = np.cross(forward, up)
     right /= np.linalg.norm(right)
     pivot = eye + forward * _depth(scene, forward)
-    around = Rotation.from_rotvec(orbit.azimuth * up / np.linalg.norm(up), degrees=True)
+    around = Rotation.from_rotvec(orbit.azimuth * up, degrees=True)
     over = Rotation.from_rotvec(-orbit.elevation * right, degrees=True)
     turn = around * over
     there = pivot + turn.apply(eye - pivot) * 2.0**-orbit.zoom
-    return replace(camera, eye=there, target=pivot, up=turn.apply(up))
+    return replace(camera, eye=_point(there), target=_point(pivot), up=_point(turn.apply(up)))
 
 
 def _depth(scene: Scene, forward: NDArray[np.float64]) -> float:
-    """How far ahead of the eye the middle of the scene is, if it is ahead."""
-    low, high = bounding_box(scene)
+    """How far ahead of the eye the middle of what stands around it is, if it is ahead.
+
+    What holds the eye, such as a sky, is left out if there is anything else.
+    """
+    eye = scene.camera.eye
+    boxes = [_box(shape) for shape in scene.shapes]
+    outside = [box for box in boxes if (eye < box[0]).any() or (eye > box[1]).any()]
+    low, high = _around(outside or boxes)
     depth = float(((low + high) / 2 - scene.camera.eye) @ forward)
     return max(depth, NEAR * float(np.linalg.norm(high - low)))
 
 
-def bounding_box(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bounding_box(scene: Scene) -> _Box:
     """Return the least and the greatest corner (3,) of a box around all shapes."""
-    boxes = np.array([_box(shape) for shape in scene.shapes])
-    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    return _around([_box(shape) for shape in scene.shapes])
 
 
-def _box(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _around(boxes: list[_Box]) -> _Box:
+    lows, highs = zip(*boxes, strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
+def _box(shape: Shape) -> _Box:
     if isinstance(shape, Mesh):
         return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     return np.subtract(shape.center, shape.radius), np.add(shape.center, shape.radius)
+
+
+def _point(vector: NDArray[np.float64]) -> Point:
+    x, y, z = vector.tolist()
+    return x, y, z

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 ALIGNMENT = 8
 """What follows the header begins at a multiple of it, as typed arrays of browsers need it."""
 
+ORDINARY_STOPS = 6
+"""Half floats reach from 14 stops below 1 to 16 above, before they lose digits."""
+
 
 def pack(header: Mapping[str, Any], payload: bytes) -> bytes:
     """Return a message: the header's length in 4 bytes, the header, padded with blanks, the rest.
@@ -27,10 +30,20 @@ def pack(header: Mapping[str, Any], payload: bytes) -> bytes:
     return struct.pack("<I", len(text)) + text + payload
 
 
-def half_floats(image: NDArray[np.float32]) -> bytes:
-    """Return an image as IEEE half floats, little-endian; what is too large is infinite."""
+def half_floats(image: NDArray[np.float32], stops: int = 0) -> bytes:
+    """Return an image, times 2^-stops, as IEEE half floats, little-endian.
+
+    What is too large for them is infinite.
+    """
     with np.errstate(over="ignore"):
-        return image.astype("<f2").tobytes()
+        return np.ldexp(image, -stops).astype("<f2").tobytes()
+
+
+def stops_of(image: NDArray[np.float32]) -> int:
+    """By how many stops an image is so bright, or so dark, that half floats would lose it; or 0."""
+    mean = np.mean(image, where=np.isfinite(image), dtype=np.float64)
+    stops = int(np.round(np.log2(mean))) if mean > 0 else 0
+    return stops if abs(stops) > ORDINARY_STOPS else 0
 
 
 def finite(value: float) -> float | None:

@@ -14,7 +14,7 @@ from drpt.scene.checks import refuse
 if TYPE_CHECKING:
     from drpt.scene import Scene
 
-MAX_PIXELS = 2**18
+MAX_PIXELS = 2**17
 """Larger pictures are shown smaller, unless their size was asked for."""
 
 

@@ -87,7 +87,7 @@ class Guarded:
         self._guard = guard
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request, or status 403 and why."""
+        """Answer one request, or status 403, with the reason where it is seen."""
 
         async def send_with_headers(message: Message) -> None:
             if message["type"].endswith("response.start"):
@@ -98,11 +98,11 @@ class Guarded:
         if refusal is None:
             await self._app(scope, receive, send_with_headers)
             return
-        answer = PlainTextResponse(f"{refusal}\n", status_code=403)
         if scope["type"] == "websocket":
-            await WebSocket(scope, receive, send_with_headers).send_denial_response(answer)
-        else:
-            await answer(scope, receive, send_with_headers)
+            await WebSocket(scope, receive, send).close()  # before it was accepted: status 403
+            return
+        answer = PlainTextResponse(f"{refusal}\n", status_code=403)
+        await answer(scope, receive, send_with_headers)
 
 
 def in_url(host: str) -> str:

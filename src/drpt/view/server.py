@@ -102,6 +102,6 @@ async def _send(websocket: WebSocket, session: Session, ready: asyncio.Event) ->
 
 
 async def _close(websocket: WebSocket, code: int, error: Exception) -> None:
-    reason = str(error).encode()[:REASON_BYTES].decode(errors="ignore")
+    reason = str(error).encode(errors="backslashreplace")[:REASON_BYTES].decode(errors="ignore")
     with suppress(WebSocketDisconnect):
         await websocket.close(code, reason)

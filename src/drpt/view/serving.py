@@ -60,7 +60,8 @@ def _listen(host: str, port: int) -> socket.socket:
     except (socket.gaierror, UnicodeError) as error:
         allowed = "a name or an address of this machine"
         raise ValueError(f"host: {host!r} is not allowed; it must be {allowed}") from error
-    listener = socket.create_server(address, family=family)
+    both = address[0] == "::" and socket.has_dualstack_ipv6()
+    listener = socket.create_server(address, family=family, dualstack_ipv6=both)
     if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux; elsewhere the system's own, longer patience
         listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, 1000 * PATIENCE)
     return listener

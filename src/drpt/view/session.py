@@ -2,6 +2,12 @@
 
 Messages come and go in the server's thread. All else happens in the render thread, which asks one
 session after the other to go a step.
+
+A browser says, in JSON: ``view`` (show this state from now on), ``restart``, ``pause``, ``save``,
+and ``drawn`` for each frame that it has drawn. It is told: ``hello`` once, with the default state;
+after each view ``scene``, or ``refused`` and why; then frames, and what goes through its ``pixel``;
+the files that it has asked to save; ``failed``, where something did. Frames and files are binary,
+see :mod:`drpt.view.frames`; what is about a view has the number that the browser gave it.
 """
 
 from __future__ import annotations
@@ -23,6 +29,7 @@ from drpt.view.state import MAX_SEED, read_state
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from drpt.view.saving import File
     from drpt.view.scenes import Scenes
 
 MAX_FRAMES = 2
@@ -73,7 +80,6 @@ class Session:
     def __init__(self, scenes: Scenes, ready: Callable[[], None], wake: Callable[[], None]) -> None:
         self._scenes, self._ready, self._wake = scenes, ready, wake
         self._lock = RLock()
-        self._number = 0
         self._view: _View | None = None
         self._saves: deque[_Save] = deque()
         self._paused = False
@@ -161,25 +167,26 @@ class Session:
         try:
             if step:
                 step.do()
-        except ValueError as error:
-            self._tell({"type": "refused", "number": self._number, "message": str(error)})
         except Exception as error:  # whatever it is, other sessions go on
             self._show = None
-            self._tell({"type": "failed", "message": str(error) or type(error).__name__})
+            self._fail(error)
         self._ready()
 
     def _next_step(self) -> _Step | None:
         """What is to be done next, if anything is."""
-        if self._view is not None:
-            return _Step(self._change_view)
-        if self._show is None:
+        show = self._show
+        if self._view is not None and (show is None or show.is_seen):
+            return _Step(self._change_view)  # a view is seen before the next: sliders are dragged
+        if show is None:
             return None
-        return _Step(partial(self._save, self._show)) if self._saves else self._next_of(self._show)
+        if self._saves and (self._saves[0].what == "scene" or show.is_seen):
+            return _Step(partial(self._save, show))
+        return self._next_of(show)
 
     def _next_of(self, show: Show) -> _Step | None:
         """Frames first, then what has no samples yet, paths before further samples."""
         render = show.next_render(paused=self._paused)
-        if (half := show.next_stale(self._frames.keys())) is not None:
+        if (half := show.next_stale(self._frames.keys(), idle=render is None)) is not None:
             return _Step(partial(self._send_frame, show, half))
         if (render is None or render.spp) and (half := show.next_untold()) is not None:
             return _Step(partial(self._tell_paths, show, half))
@@ -191,19 +198,15 @@ class Session:
         with self._lock:
             view, self._view = self._view, None
         assert view is not None
-        self._number = view.number
         before = self._show
-        if view.state is not None:
-            state = read_state(view.state)
-        elif before is not None:
-            state = before.state
-        else:
+        try:
+            state = before.state if before and view.state is None else read_state(view.state)
+            base = self._scenes.load(state.scene)
+            self._show = Show(view.number, state, base, None if view.afresh else before)
+        except ValueError as error:
+            self._tell({"type": "refused", "number": view.number, "message": str(error)})
             return
-        base = self._scenes.load(state.scene)
-        self._show = Show(view.number, state, base, None if view.afresh else before)
-        with self._lock:
-            self._frames.clear()
-        self._tell(describe_scene(self._show))
+        self._tell(describe_scene(self._show, before))
 
     def _send_frame(self, show: Show, half: int) -> None:
         frame = show.frame(half)
@@ -216,16 +219,26 @@ class Session:
     def _save(self, show: Show) -> None:
         with self._lock:
             save = self._saves.popleft()
-        stem = Path(show.state.scene).stem
-        if save.what == "scene":
-            file = scene_file(show.scene, stem)
-        else:
-            result = show.halves[min(save.half, len(show.halves) - 1)].result()
-            file = picture_file(result, stem, save.what, save.exposure)
+        try:
+            file = _file(show, save)
+        except (OSError, ValueError, MemoryError) as error:
+            self._fail(error)
+            return
         header = {"type": "file", "name": file.name, "media": file.media}
         with self._lock:
             self._messages.append(pack(header, file.content))
 
+    def _fail(self, error: Exception) -> None:
+        self._tell({"type": "failed", "message": str(error) or type(error).__name__})
+
     def _tell(self, message: Mapping[str, Any]) -> None:
         with self._lock:
             self._messages.append(json.dumps(message, allow_nan=False))
+
+
+def _file(show: Show, save: _Save) -> File:
+    stem = Path(show.state.scene).stem
+    if save.what == "scene":
+        return scene_file(show.scene, stem)
+    result = show.halves[min(save.half, len(show.halves) - 1)].result()
+    return picture_file(result, stem, save.what, save.exposure)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from drpt.error import DARK
 from drpt.view.edits import edited
-from drpt.view.frames import finite, half_floats, pack
+from drpt.view.frames import finite, half_floats, pack, stops_of
 from drpt.view.progressive import Progressive
 from drpt.view.state import Half
 
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from drpt.view.state import State
 
 REFERENCE_SPP = 2**14
+REFERENCE_LEAD = 4
+"""So many samples a reference has for one of a half, as long as both are rendered."""
+FRAME_REST = 3
+"""So many times as long as a frame has taken, no other of the same half is made."""
 REFERENCE_SEED = 2**53
 """One that no state has, so that the noise of a reference is not that of what is compared."""
 
@@ -48,41 +53,54 @@ class Show:
         self.number, self.state, self._base = number, state, scene
         self.scene = self._same_scene(before) or edited(scene, state.edits, state.camera)
         _check_pixel(state, self.scene)
-        going_on = before.renders if before else []
-        self.halves = [self._render(half, state.spp, state.seed, going_on) for half in state.halves]
-        self._references = {
-            half.bounces: self._render(
-                Half(bounces=half.bounces), REFERENCE_SPP, REFERENCE_SEED, going_on
-            )
+        known = before._renders if before else []
+        self.halves = [
+            _known_or_new(known, Progressive(self.scene, half, state.spp, state.seed))
             for half in state.halves
+        ]
+        self._references = {
+            bounces: _known_or_new(known, _reference(self.scene, bounces))
+            for bounces in {half.bounces for half in state.halves}
             if state.difference == "reference"
         }
-        self._stale = set(range(len(self.halves)))
-        self._untold = deque(range(len(self.halves)) if state.pixel else ())
+        numbers = range(len(self.halves))
+        self._unseen, self._stale = set(numbers), set(numbers)
+        self._due = dict.fromkeys(numbers, 0.0)
+        self._untold = deque(numbers if state.pixel else ())
 
-    @property
-    def renders(self) -> list[Progressive]:
-        """All that is rendered."""
-        return [*self.halves, *self._references.values()]
+    def has_the_shapes_of(self, other: Show) -> bool:
+        """Whether both have the same scene with the same edits."""
+        return self._base is other._base and self.state.edits == other.state.edits
 
     def _same_scene(self, before: Show | None) -> Scene | None:
-        if before is None or before._base is not self._base:
+        if before is None or not self.has_the_shapes_of(before):
             return None
-        same = (before.state.edits, before.state.camera) == (self.state.edits, self.state.camera)
-        return before.scene if same else None
+        return before.scene if before.state.camera == self.state.camera else None
 
-    def _render(self, half: Half, spp: int, seed: int, going_on: list[Progressive]) -> Progressive:
-        """The render that goes on, or a new one."""
-        fresh = Progressive(self.scene, half, spp, seed)
-        return next((render for render in going_on if render.does_the_same_as(fresh)), fresh)
+    @property
+    def _renders(self) -> list[Progressive]:
+        return [*self.halves, *self._references.values()]
 
     # --- steps ------------------------------------------------------------------------------------
 
-    def next_stale(self, waiting: Collection[int]) -> int | None:
-        """A half of which there is more to see than in its last frame, if none of it waits."""
-        return next(
-            (half for half in self._stale if self.halves[half].spp and half not in waiting), None
-        )
+    @property
+    def is_seen(self) -> bool:
+        """Whether there was a frame of every half."""
+        return not self._unseen
+
+    def next_stale(self, waiting: Collection[int], *, idle: bool) -> int | None:
+        """A half of which there is more to see than in its last frame.
+
+        While frames of it wait to be sent, and unless the render is ``idle``, only at times: frames
+        take time, too.
+        """
+        for half in self._stale:
+            if not self.halves[half].spp:
+                continue
+            rested = idle or perf_counter() >= self._due[half]
+            if half in self._unseen or (half not in waiting and rested):
+                return half
+        return None
 
     def next_untold(self) -> int | None:
         """A half whose paths through the pixel have not been told."""
@@ -91,11 +109,13 @@ class Show:
     def next_render(self, *, paused: bool) -> Progressive | None:
         """What is to take the next samples: of what is not finished, the one with the fewest.
 
-        So halves are seen after about as many. Where it is paused, what has none yet gets some.
+        So halves are seen after about as many, and references run ahead of them. Where it is
+        paused, what has none yet gets some.
         """
-        waiting = self.halves if paused else self.renders
-        unfinished = [render for render in waiting if not (render.spp if paused else render.done)]
-        return min(unfinished, key=lambda render: render.spp, default=None)
+        share = {id(render): REFERENCE_LEAD for render in self._references.values()}
+        renders = self.halves if paused else self._renders
+        unfinished = [render for render in renders if not (render.spp if paused else render.done)]
+        return min(unfinished, key=lambda it: it.spp / share.get(id(it), 1), default=None)
 
     def advance(self, render: Progressive) -> None:
         """Take more samples; what they are seen in is stale from then on."""
@@ -117,13 +137,19 @@ class Show:
 
     def frame(self, half: int) -> bytes:
         """Return the message that shows a half."""
+        start = perf_counter()
         self._stale.discard(half)
+        self._unseen.discard(half)
         render, truth = self.halves[half], self._truth(half)
         result = render.result()
-        images, measured = {"radiance": result.image}, None
+        stops = stops_of(result.image)
+        payload = half_floats(result.image, stops)
+        measured, difference = None, None
         if truth and truth.spp:
-            images["difference"] = relative_difference(result.image, truth.result().image)
-            measured = finite(float(np.mean(np.square(images["difference"], dtype=np.float64))))
+            true = truth.result()
+            difference = relative_difference(result.image, true.image)
+            payload += half_floats(difference)
+            measured = finite(float(np.mean(np.square(difference, dtype=np.float64))) - true.error)
         header = {
             "type": "frame",
             "number": self.number,
@@ -140,9 +166,12 @@ class Show:
             "done": render.done,
             "warning": result.warning,
             "pixel": self._pixel(result),
-            "images": list(images),
+            "stops": stops,
+            "images": ["radiance", *(["difference"] if difference is not None else [])],
         }
-        return pack(header, b"".join(map(half_floats, images.values())))
+        message = pack(header, payload)
+        self._due[half] = perf_counter() + FRAME_REST * (perf_counter() - start)
+        return message
 
     def _pixel(self, result: Result) -> dict[str, Any] | None:
         if self.state.pixel is None:
@@ -173,6 +202,19 @@ class Show:
             **_first_hit(paths),
             "paths": paths,
         }
+
+
+def _reference(scene: Scene, bounces: int) -> Progressive:
+    return Progressive(scene, Half(bounces=bounces), REFERENCE_SPP, REFERENCE_SEED)
+
+
+def _known_or_new(known: list[Progressive], new: Progressive) -> Progressive:
+    """A render that does the same as the new one; else that, which is known from then on."""
+    for render in known:
+        if render.does_the_same_as(new):
+            return render
+    known.append(new)
+    return new
 
 
 def relative_difference(

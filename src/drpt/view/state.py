@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from drpt.render import SAMPLERS, Mode
-from drpt.scene.checks import refuse
-from drpt.settings import check_choice, check_mode, check_number, check_whole
+from drpt.settings import check_choice, check_mode, check_number, check_whole, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -130,8 +130,8 @@ def _edits(value: object) -> dict[int, Mapping[str, Any]]:
     if not isinstance(value, dict):
         raise refuse("edits", value, "an object")
     for number, edit in value.items():
-        if not (number.isascii() and number.isdigit()) or not isinstance(edit, dict):
-            raise refuse(f"edits[{number!r}]", edit, "an object under the number of a shape")
+        if not re.fullmatch("[0-9]{1,9}", number) or not isinstance(edit, dict):
+            raise refuse("edits", {number: edit}, "an object for each number of a shape")
     return {int(number): edit for number, edit in value.items()}
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 MAX_SESSIONS = 32
-"""Each of them may hold some 20 MB of pictures."""
+"""Each of them may hold up to four films, of 30 MB in the largest pictures, and unsent files."""
 
 
 class TooManySessions(RuntimeError):  # noqa: N818 -- it says what is wrong

@@ -149,7 +149,7 @@ class Page {
 
   #takeScene(message) {
     this.asking.accept(message.number);
-    this.view.scene = message;
+    this.view.scene = { ...this.view.scene, ...message }; // without shapes, they are as before
     byId("picture").style.setProperty("--aspect", String(message.width / message.height));
     if (message.number > this.saidFor) this.#say("");
     this.view.changed();

@@ -12,8 +12,12 @@ export const onTheme = (listener) => DARK.addEventListener("change", listener);
 
 /**
  * @typedef {{ exposure: number, scale: number, divider: number }} Look
- * @typedef {Record<string, Uint16Array>} Images half floats by name, three to a pixel
+ * @typedef {{ stops: number, radiance: Uint16Array, difference?: Uint16Array }} Images half floats,
+ *   three to a pixel; the radiance is brighter by so many stops
  */
+
+/** One for each half, at the exposures before and after a change. */
+const TABLES = 4;
 
 export class Picture {
   /** @param {HTMLCanvasElement} canvas */
@@ -21,7 +25,8 @@ export class Picture {
     this.canvas = canvas;
     /** @type {Images[]} */
     this.halves = [];
-    this.exposure = NaN;
+    /** Tables of levels by exposure: those that were used last. */
+    this.levels = new Map();
     this.setTheme();
   }
 
@@ -32,11 +37,11 @@ export class Picture {
 
   /**
    * Keep a frame of a half, to be drawn next time.
-   * @param {{ half: number, width: number, height: number, images: string[] }} header
+   * @param {{ half: number, width: number, height: number, stops: number, images: string[] }} header
    * @param {ArrayBuffer} buffer
    * @param {number} start where the images begin
    */
-  take({ half, width, height, images }, buffer, start) {
+  take({ half, width, height, stops, images }, buffer, start) {
     if (width !== this.canvas.width || height !== this.canvas.height) {
       Object.assign(this.canvas, { width, height });
       this.halves = [];
@@ -46,7 +51,7 @@ export class Picture {
       name,
       new Uint16Array(buffer, start + 2 * size * i, size),
     ]);
-    this.halves[half] = Object.fromEntries(arrays);
+    this.halves[half] = { stops, ...Object.fromEntries(arrays) };
   }
 
   /**
@@ -73,7 +78,7 @@ export class Picture {
     const values = images.difference ?? images.radiance;
     const colour = images.difference
       ? this.#differenceColour(scale)
-      : this.#radianceColour(exposure);
+      : this.#radianceColour(exposure + images.stops);
     const { width, height } = this.canvas;
     for (let y = 0; y < height; y++) {
       for (let x = from; x < to; x++) {
@@ -85,11 +90,10 @@ export class Picture {
 
   /** Return a function from the bits of three half floats to a pixel. */
   #radianceColour(exposure) {
-    if (exposure !== this.exposure) {
-      this.exposure = exposure;
-      this.levels = levels(exposure);
-    }
-    const level = /** @type {Uint16Array} */ (this.levels);
+    const level = this.levels.get(exposure) ?? levels(exposure);
+    this.levels.delete(exposure);
+    this.levels.set(exposure, level);
+    if (this.levels.size > TABLES) this.levels.delete(this.levels.keys().next().value);
     return (r, g, b) =>
       (level[r] | level[g] | level[b]) & NOT_A_NUMBER
         ? MAGENTA
