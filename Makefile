@@ -11,10 +11,10 @@ demo: $(STAMP)  ## render the Cornell box
 
 test: $(STAMP)  ## every test; those of the browser need Chromium, which is installed if it may be
 	@tools/browser.sh
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 test-quick: $(STAMP)  ## the tests that take no more than a few seconds
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 lint: $(STAMP)  ## what CI checks before the tests
 	$(BIN)/ruff check .

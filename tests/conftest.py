@@ -1,5 +1,6 @@
 """Loads the backend before test modules import kernels; moves arrays to the device and back."""
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -38,3 +39,14 @@ def unit_square(count: int, seed: int = 0) -> Any:
     """Return points of the unit square at random, of 24 bits each like those of a sampler."""
     rng = np.random.default_rng(seed)
     return to_device(rng.integers(0, 2**24, (count, 2)) * 2.0**-24)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run the files with the most slow tests first: of two processes, none is left with the last.
+
+    Without slow tests to run, the order stays.
+    """
+    slow: Counter[object] = Counter()
+    for item in items:
+        slow[item.path] += item.get_closest_marker("slow") is not None
+    items.sort(key=lambda item: -slow[item.path])

@@ -27,10 +27,13 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-FACET_LIMIT = 96
-"""Up to so many facets that reflect are met one by one in the kernel: where Embree is as fast."""
+FACET_LIMIT = 64
+"""Up to so many facets that reflect are met one by one in the kernel.
+
+Embree is as fast as 110, but kernels of so many take seconds to compile.
+"""
 LIGHT_FACET_LIMIT = 24
-"""Likewise of those that emit."""
+"""Likewise of those that emit, where Embree is as fast."""
 SPHERE_LIMIT = 64
 """Likewise of spheres, where a tree is as fast."""
 MERGE_LIMIT = 4 * FACET_LIMIT
