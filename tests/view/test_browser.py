@@ -149,7 +149,7 @@ def test_choices(open_view: Open) -> None:
         await_other(page, before)
         await_url(page, hash_)
         before = finished(page)
-    page.locator("#surface-choice").select_option(label="shapes[2] · mesh of 2 faces")
+    page.locator("#surface-choice").select_option(label="shapes[2] · 2 faces")
     page.get_by_label("Phong").locator("visible=true").check()
     await_url(page, "shape2.exponent=50")
     await_other(page, before)
@@ -159,6 +159,39 @@ def test_choices(open_view: Open) -> None:
     page.wait_for_function("() => !location.hash.includes('shape2')")
     page.get_by_role("button", name="Reset all").click()
     page.wait_for_function("() => location.hash === '#scene=cornell-box'")
+
+
+def test_numbers_keep_within_what_they_mean(open_view: Open) -> None:
+    page = open_view("exposure=1000&divider=5&scale=-1&path=-3&toString=1")
+    expect(page.get_by_role("alert")).to_contain_text("toString=1")
+    page.get_by_role("button", name="Dismiss").click()
+    await_url(page, "exposure=100")
+    enter(page, "Seed", 1234567)
+    await_url(page, "seed=1234567")
+    expect(page.get_by_role("spinbutton", name="Seed")).to_have_value("1234567")
+    slider = page.get_by_role("slider", name="spp, slider")
+    for key, spp in [("Home", 1), ("ArrowRight", 2), ("End", 2**20), ("ArrowLeft", 1010000)]:
+        slider.press(key)
+        await_url(page, f"spp={spp}")
+    expect(page.get_by_role("alert")).to_be_hidden()
+
+
+def test_a_refusal_is_seen_wherever_one_is(open_view: Open) -> None:
+    for window in (WINDOW, {"width": 390, "height": 844}):
+        page = open_view(FEW, viewport=window)
+        finished(page)
+        enter(page, "Elevation", 999)
+        expect(page.get_by_role("alert")).to_be_in_viewport()
+        expect(page.get_by_role("alert")).to_contain_text("camera.elevation: 999 is not allowed")
+
+
+def test_a_surface_that_is_phong_again_is_as_glossy_as_before(open_view: Open) -> None:
+    page = open_view(f"{FEW}&shape1.exponent=777&surface=1")
+    finished(page)
+    page.get_by_label("diffuse").locator("visible=true").check()
+    await_url(page, "shape1.exponent=null")
+    page.get_by_label("Phong").locator("visible=true").check()
+    await_url(page, "shape1.exponent=777")
 
 
 def test_a_slider_that_is_dragged_shows_pictures_on_its_way(open_view: Open) -> None:

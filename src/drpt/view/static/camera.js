@@ -10,21 +10,25 @@ const RIGHT_BUTTON = 2;
  * Let drags and the wheel on an element move a view's camera.
  * @param {HTMLElement} element
  * @param {import("./view.js").View} view
+ * @returns {() => boolean} whether the last press was for the camera, and its click is for nothing
  */
 export function addOrbit(element, view) {
+  let orbiting = false;
   element.addEventListener("contextmenu", (event) => event.preventDefault());
   element.addEventListener("pointerdown", (event) => {
-    if (!orbits(event)) return;
+    orbiting = orbits(event);
+    if (!orbiting) return;
     event.preventDefault();
     element.focus();
     element.setPointerCapture(event.pointerId);
     follow(element, view, event);
   });
   element.addEventListener("wheel", (event) => wheel(element, view, event), { passive: false });
+  return () => orbiting;
 }
 
 /** Whether a button of the mouse means the camera. */
-export function orbits({ button, altKey }) {
+function orbits({ button, altKey }) {
   return button === RIGHT_BUTTON || altKey;
 }
 
@@ -58,6 +62,5 @@ function wheel(element, view, event) {
   if (event.ctrlKey || scrolls) return;
   event.preventDefault();
   const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 16 : 1;
-  const zoom = view.state.camera.zoom - event.deltaY * lines * STOPS_PER_PIXEL;
-  view.move({ zoom: Math.round(100 * zoom) / 100 });
+  view.zoomBy(-event.deltaY * lines * STOPS_PER_PIXEL);
 }

@@ -47,7 +47,7 @@ function addSampling(view) {
     read: () => view.state[key],
     write: (value) => view.change({ [key]: value }),
   });
-  const spp = { ...field("spp", "spp"), range: [1, 2 ** 20], logarithmic: true };
+  const spp = { ...field("spp", "spp"), range: [1, 2 ** 20], logarithmic: true, whole: true };
   return addFields(byId("sampling-fields"), [spp, field("Seed", "seed")]);
 }
 

@@ -2,7 +2,14 @@
 /** The divider between the halves: by mouse, touch or keys. */
 
 const STEP = 0.01;
-const KEYS = { ArrowLeft: -STEP, ArrowRight: STEP, PageDown: -10 * STEP, PageUp: 10 * STEP };
+const KEYS = {
+  ArrowLeft: -STEP,
+  ArrowRight: STEP,
+  ArrowDown: -STEP,
+  ArrowUp: STEP,
+  PageDown: -10 * STEP,
+  PageUp: 10 * STEP,
+};
 
 /**
  * Let a divider follow a view, and move it.

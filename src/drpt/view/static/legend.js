@@ -29,7 +29,7 @@ export function showLegend(difference, scale, headers) {
     "aria-label",
     `Colours from ${short(scale)} darker to ${short(scale)} brighter than ${than}`,
   );
-  byId("legend-text").textContent = `(x − y) / √(y² + 0.01), y: ${than}${measured(headers)}`;
+  byId("legend-text").textContent = `(x − y) / √(y² + 0.01), x: the picture, y: ${than}${measured(headers)}`;
 }
 
 function measured(headers) {

@@ -3,7 +3,7 @@
 
 import { Asking } from "./asking.js";
 import { Busy } from "./busy.js";
-import { addOrbit, orbits } from "./camera.js";
+import { addOrbit } from "./camera.js";
 import { Chart } from "./chart.js";
 import { Connection } from "./connection.js";
 import { addControls } from "./controls.js";
@@ -100,10 +100,10 @@ class Page {
 
   #addPicture(element) {
     const pick = (pixel) => this.inspector.pick(pixel);
-    addOrbit(element, this.view);
+    const orbited = addOrbit(element, this.view);
     addPictureKeys(element, this.view, pick);
     element.addEventListener("click", (event) => {
-      if (!orbits(event) && this.view.scene) pick(this.#pixelAt(event));
+      if (!orbited() && this.view.scene) pick(this.#pixelAt(event));
     });
   }
 
@@ -136,6 +136,10 @@ class Page {
   }
 
   #save(what) {
+    if (!this.connection.isOpen) {
+      this.#say("The server is gone: what it has rendered cannot be saved.");
+      return;
+    }
     const half = this.view.state.halves.length === 2 ? Number(byId("save-half").value) : 0;
     this.connection.send({ type: "save", what, half, exposure: this.view.look.exposure });
   }

@@ -14,6 +14,7 @@ let made = 0;
  * @property {[number, number]} [range] of the slider; without it there is none
  * @property {number} [step] of the slider
  * @property {boolean} [logarithmic] whether the slider's positions are those of the logarithm
+ * @property {boolean} [whole] whether the slider knows whole numbers alone
  * @property {string} [unit]
  */
 
@@ -39,9 +40,10 @@ export class NumberField {
 
   #makeSlider(name) {
     const slider = make("input", { type: "range", "aria-label": name });
-    slider.addEventListener("input", () =>
-      this.settings.write(this.#valueAt(slider.valueAsNumber)),
-    );
+    slider.addEventListener("input", () => {
+      this.typing = false;
+      this.settings.write(this.#valueAt(slider.valueAsNumber));
+    });
     return slider;
   }
 
@@ -58,13 +60,14 @@ export class NumberField {
     const value = this.settings.read();
     this.element.hidden = value == null;
     if (value == null) return;
-    if (!this.typing) this.number.value = String(Number(value.toPrecision(6)));
+    if (!this.typing) this.number.value = String(Number.isInteger(value) ? value : digits(value, 6));
     if (!this.slider) return;
     this.slider.value = String(this.#positionOf(value));
     this.slider.setAttribute("aria-valuetext", this.number.value);
   }
 
   #typed() {
+    if (!this.typing) return; // the slider was faster
     this.typing = false;
     const value = this.number.valueAsNumber;
     if (Number.isFinite(value)) this.settings.write(value);
@@ -72,9 +75,18 @@ export class NumberField {
   }
 
   #valueAt(position) {
-    if (!this.settings.logarithmic) return Number(position.toPrecision(6));
+    if (!this.settings.logarithmic) return digits(position, 6);
     const [min, max] = this.range;
-    return Number((min * (max / min) ** (position / POSITIONS)).toPrecision(3));
+    const value = digits(min * (max / min) ** (position / POSITIONS), 3);
+    const inside = Math.min(Math.max(value, min), max);
+    return this.settings.whole ? this.#wholeNear(inside, position) : inside;
+  }
+
+  /** The whole number near a value, another one than before where the slider was moved. */
+  #wholeNear(value, position) {
+    const before = /** @type {number} */ (this.settings.read());
+    const way = Math.sign(position - this.#positionOf(before));
+    return Math.round(value) === before ? before + way : Math.round(value);
   }
 
   #positionOf(value) {
@@ -82,6 +94,10 @@ export class NumberField {
     const [min, max] = this.range;
     return Math.round((POSITIONS * Math.log(value / min)) / Math.log(max / min));
   }
+}
+
+function digits(value, count) {
+  return Number(value.toPrecision(count));
 }
 
 /** Put fields into an element and return a function that refreshes all of them. */

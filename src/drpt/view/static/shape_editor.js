@@ -27,6 +27,8 @@ export class ShapeEditor {
     this.kind = kind;
     this.known = "";
     this.ranged = "";
+    /** What a surface gets that is to be Phong again. */
+    this.lastExponent = FIRST_EXPONENT;
     this.#build();
     view.onChange(() => this.refresh());
   }
@@ -54,7 +56,7 @@ export class ShapeEditor {
     this.select.addEventListener("change", () =>
       this.view.show({ [this.kind]: Number(this.select.value) }),
     );
-    const label = make("label", { htmlFor: id }, "Shape");
+    const label = make("label", { htmlFor: id }, this.kind === "light" ? "Light" : "Surface");
     const choice = make("div", { className: "field" }, label, this.select);
     this.note = make("p", { className: "note" });
     this.back = make("button", { type: "button", className: "quiet" }, `Reset ${this.kind}`);
@@ -101,13 +103,14 @@ export class ShapeEditor {
   }
 
   #makeMaterial() {
-    const set = (exponent) => this.view.edit(this.chosen, { exponent });
     const radio = (label, exponent) => {
       const input = make("input", { type: "radio", name: `${this.kind}-material` });
-      input.addEventListener("change", () => set(exponent));
+      input.addEventListener("change", () =>
+        this.view.edit(this.chosen, { exponent: exponent() }),
+      );
       return make("label", {}, input, ` ${label}`);
     };
-    const choices = [radio("diffuse", null), radio("Phong", FIRST_EXPONENT)];
+    const choices = [radio("diffuse", () => null), radio("Phong", () => this.lastExponent)];
     const legend = make("legend", {}, "Material");
     return make("fieldset", { className: "choices" }, legend, ...choices);
   }
@@ -121,6 +124,7 @@ export class ShapeEditor {
     this.#setRanges();
     for (const field of this.fields) field.refresh();
     const { albedo, exponent, radiance } = this.shape;
+    this.lastExponent = exponent ?? this.lastExponent;
     this.material.hidden = albedo == null;
     const [diffuse, phong] = this.material.querySelectorAll("input");
     [diffuse.checked, phong.checked] = [exponent == null, exponent != null];
@@ -139,11 +143,14 @@ export class ShapeEditor {
     this.select.value = String(this.chosen);
   }
 
-  /** Fit the sliders of a sphere to it when it is chosen. */
+  /** Fit the sliders of a sphere to it when it is chosen, or has left them. */
   #setRanges() {
     const { center, radius } = this.shape;
     const key = `${this.view.scene.scene} ${this.chosen}`;
-    if (!center || key === this.ranged) return;
+    const inside = (field, value) => field.range[0] <= value && value <= field.range[1];
+    const fits = () =>
+      inside(this.radius, radius) && this.center.every((field, i) => inside(field, center[i]));
+    if (!center || (key === this.ranged && fits())) return;
     this.ranged = key;
     this.radius.setRange(RADII.map((factor) => Number((factor * radius).toPrecision(2))));
     const { eye } = this.view.scene.camera;
@@ -164,7 +171,7 @@ export class ShapeEditor {
 }
 
 function nameOf({ index, kind, faces }) {
-  return `${shapeName(index)} · ${kind === "mesh" ? `mesh of ${faces} faces` : kind}`;
+  return `${shapeName(index)} · ${kind === "mesh" ? `${faces} faces` : kind}`;
 }
 
 /** The next 1, 2, 2.5 or 5 times a power of ten. */

@@ -71,13 +71,14 @@ function addDialog() {
 export function addPictureKeys(picture, view, pick) {
   picture.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || !view.scene) return;
+    if (event.target !== picture) return; // but the divider on it
     const { width, height } = view.scene;
     if (event.key in ARROWS) {
       const [column, row] = view.state.pixel ?? [width >> 1, height >> 1];
       const [right, down] = ARROWS[event.key].map((way) => way * (event.shiftKey ? 10 : 1));
       pick([column + right, row + down]);
     } else if (event.key in ZOOMS) {
-      view.move({ zoom: view.state.camera.zoom + ZOOMS[event.key] });
+      view.zoomBy(ZOOMS[event.key]);
     } else if (event.key === "Escape") {
       pick(null);
     } else {

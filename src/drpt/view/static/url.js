@@ -14,11 +14,23 @@ export const LOOK = {
   surface: null,
 };
 
+const LIMITS = { exposure: [-100, 100], scale: [1e-6, 1e6], divider: [0, 1] };
+
 /** Keys whose values are numbers, by where they stand. */
 const NUMBERS = { state: ["spp", "seed", "paths"], look: ["exposure", "scale", "divider"] };
 const CHOICES = ["path", "light", "surface"];
 const CAMERA = ["azimuth", "elevation", "zoom"];
 const EDIT = /^shape(\d+)\.(radius|center|albedo|exponent)$/;
+
+/** Return a look within its limits. */
+export function limited(look) {
+  const inside = Object.entries(LIMITS).map(([key, [min, max]]) => [
+    key,
+    Math.min(Math.max(look[key], min), max),
+  ]);
+  const chosen = CHOICES.map((key) => [key, look[key] !== null && look[key] >= 0 ? Math.floor(look[key]) : null]);
+  return { ...look, ...Object.fromEntries(inside), ...Object.fromEntries(chosen) };
+}
 
 /**
  * Write a state and a look as `key=value` pairs: the scene, and what differs from the default.
@@ -60,7 +72,7 @@ export function read(hash, base) {
   for (const [key, text] of new URLSearchParams(hash.replace(/^#/, ""))) {
     if (!take(view, key, text)) ignored.push(`${key}=${text}`);
   }
-  return { ...view, ignored };
+  return { state: view.state, look: limited(view.look), ignored };
 }
 
 /** Set what a pair says and return true; or return false. Ranges are judged by the server. */
@@ -73,7 +85,7 @@ function take({ state, look }, key, text) {
   else if (key === "pixel") return set(state, key, numbers(text, 2));
   else if (CAMERA.includes(key)) return set(state.camera, key, numbers(text, 1)?.[0]);
   else if (NUMBERS.state.includes(key)) return set(state, key, numbers(text, 1)?.[0]);
-  else if (key in LOOK) return set(look, key, numbers(text, 1)?.[0]);
+  else if (Object.hasOwn(LOOK, key)) return set(look, key, numbers(text, 1)?.[0]);
   else return false;
   return true;
 }

@@ -1,7 +1,10 @@
 // @ts-check
 /** What is looked at: the state, asked of the server, and the look, which is the page's own. */
 
-import { LOOK } from "./url.js";
+import { LOOK, limited } from "./url.js";
+
+/** How near and how far the camera goes, in stops. */
+const FARTHEST = 16;
 
 export class View {
   /**
@@ -41,7 +44,7 @@ export class View {
 
   /** Change parts of the look. */
   show(parts) {
-    this.replace(this.state, { ...this.look, ...parts });
+    this.replace(this.state, limited({ ...this.look, ...parts }));
   }
 
   /** Change settings of one half. */
@@ -53,6 +56,12 @@ export class View {
   /** Change the camera. */
   move(parts) {
     this.change({ camera: { ...this.state.camera, ...parts } });
+  }
+
+  /** Bring the camera nearer by some stops, as far as it goes. */
+  zoomBy(stops) {
+    const zoom = Math.round(100 * (this.state.camera.zoom + stops)) / 100;
+    this.move({ zoom: Math.min(Math.max(zoom, -FARTHEST), FARTHEST) });
   }
 
   /** Show one half, or two that begin as the same. */
