@@ -7,7 +7,6 @@ metadata says how it was made. All of them take a quarter of an hour on two core
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -46,7 +45,7 @@ def small(scene: Scene) -> Scene:
     """The same scene with the references' height."""
     camera = scene.camera
     width = round(camera.width * HEIGHT / camera.height)
-    return replace(scene, camera=replace(camera, width=width, height=HEIGHT))
+    return scene.resized(width, HEIGHT)
 
 
 def make(name: str, bounces: int) -> None:

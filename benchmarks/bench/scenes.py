@@ -66,7 +66,7 @@ def resized(scene: Scene, height: int) -> Scene:
     """The same scene with another number of pixels."""
     camera = scene.camera
     width = round(camera.width * height / camera.height)
-    return replace(scene, camera=replace(camera, width=width, height=height))
+    return scene.resized(width, height)
 
 
 def terrain(triangles: int) -> Scene:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from shutil import which
 from typing import TYPE_CHECKING
 
 import pytest
 
 from drpt.gallery import making
 from drpt.gallery.making import make_gallery
+from tests.browsing import chromium
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,15 +24,10 @@ def test_a_picture_is_enlarged_by_the_keyboard(
     plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is there, nothing sticks out of a narrow window, and Escape leads back."""
-    sync = pytest.importorskip("playwright.sync_api")
-    chromium = which("chromium") or pytest.skip("there is no Chromium")
     monkeypatch.setattr(making, "QUESTIONS", ())
     path = make_gallery(tmp_path, plan)
     complaints: list[str] = []
-    with (
-        sync.sync_playwright() as playwright,
-        playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"]) as browser,
-    ):
+    with chromium() as browser:
         page = browser.new_page(viewport={"width": NARROW, "height": 600})
         page.on("console", lambda message: complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))

@@ -39,12 +39,13 @@ def scene_of(
     exponent: float = 20,
     radiance: float = 3,
     radius: float = 0.5,
+    place: tuple[float, float, float] = (-1, 0, 1.5),
     eye: tuple[float, float, float] = EYE,
     fov: float = 50,
     room: bool = False,
 ) -> drpt.Scene:
     lamps: list[Shape] = [
-        drpt.Sphere((-1, 0, 1.5), radius, radiance=radiance),
+        drpt.Sphere(place, radius, radiance=radiance),
         drpt.Sphere((0, 1, 1), 0.1, radiance=radiance),
     ]
     floor = [[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]]
@@ -179,6 +180,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "exponent": {"exponent": 300},
     "radiance": {"radiance": 11},
     "radius of a light": {"radius": 0.3},
+    "place of a light": {"place": (-0.5, 0.5, 1.75)},
     "eye": {"eye": (1.0, -5.0, 2.0)},
     "fov": {"fov": 30},
 }

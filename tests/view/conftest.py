@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 import sys
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.browsing import chromium
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+    from playwright.sync_api import Browser, Page
+
 SIDE = 64
 # The render of a new scene has to be compiled first, on a machine that does other things as well.
 PATIENCE_MS = 20_000
@@ -85,14 +85,8 @@ def viewer() -> Iterator[Viewer]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        pytest.skip(f"there is none of {', '.join(BROWSERS)}")
-    flags = ["--no-sandbox"] if os.geteuid() == 0 else []  # root has no sandbox
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=flags)
-        yield browser
-        browser.close()
+    with chromium() as running:
+        yield running
 
 
 @pytest.fixture

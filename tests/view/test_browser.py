@@ -100,6 +100,11 @@ def test_pause_and_restart(open_view: Open) -> None:
     page.get_by_role("button", name="Go on").click()
     expect(samples).not_to_have_text(before)
     page.get_by_role("button", name="Restart").click()
+    page.wait_for_function(
+        "before => Number.parseInt(document.querySelector('[data-part=samples]').textContent)"
+        " < Number.parseInt(before)",
+        arg=before,
+    )
     expect(page.get_by_role("alert")).to_be_hidden()
 
 

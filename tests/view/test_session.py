@@ -12,6 +12,7 @@ import pytest
 
 import drpt
 from drpt.output import read
+from drpt.view.frames import half_floats, stops_of
 from drpt.view.scenes import Scenes
 from drpt.view.session import MAX_FRAMES, MAX_WAITING, ProtocolError, Session
 from drpt.view.show import REFERENCE_SPP
@@ -456,3 +457,9 @@ def test_no_brightness_is_lost_on_the_way(radiance: float, tmp_path: Path) -> No
     frame = browser.next_frame()
     shown = float(frame.images()["radiance"].max()) * 2.0 ** frame.header["stops"]
     assert shown == pytest.approx(radiance, rel=HALF)
+
+
+def test_a_picture_that_is_nowhere_finite_is_shown_as_it_is() -> None:
+    nothing = np.full((2, 2, 3), np.nan, np.float32)
+    assert stops_of(nothing) == 0
+    assert np.isnan(np.frombuffer(half_floats(nothing), "<f2")).all()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -130,7 +130,7 @@ def _resized(scene: Scene, estimate: Estimate, path: str | PathLike[str]) -> Sce
             f"{path}: its size, {width}x{height}, has not the shape of the scene's "
             f"{camera.width}x{camera.height}"
         )
-    return replace(scene, camera=replace(camera, width=width, height=height))
+    return scene.resized(width, height)
 
 
 def _remarks(scene: Scene) -> tuple[str, ...]:

@@ -41,7 +41,7 @@ def half_floats(image: NDArray[np.float32], stops: int = 0) -> bytes:
 
 def stops_of(image: NDArray[np.float32]) -> int:
     """By how many stops an image is so bright, or so dark, that half floats would lose it; or 0."""
-    mean = np.mean(image, where=np.isfinite(image), dtype=np.float64)
+    mean = np.sum(image, where=np.isfinite(image), dtype=np.float64) / image.size
     stops = int(np.round(np.log2(mean))) if mean > 0 else 0
     return stops if abs(stops) > ORDINARY_STOPS else 0
 
