@@ -60,15 +60,24 @@ class Brdf(NamedTuple):
         )
 
     def sample(self, u: Array2f) -> tuple[Array3f, Array3f]:
-        """Solid angle: a direction ω_i, and its weight, eval / pdf; neither is divided for."""
+        """Solid angle: a direction ω_i, and its weight, eval / pdf."""
         local = self._either(
             lambda: square_to_cosine_hemisphere(u), lambda: square_to_phong_lobe(u, self.exponent)
         )
         to_light = frame(self._either(lambda: self.shading_normal, self._mirrored)).to_world(local)
+        return to_light, self.weight(to_light)
+
+    def weight(self, to_light: Array3f) -> Array3f:
+        """eval / pdf of a direction ω_i; neither is divided for."""
         cosine = dr.dot(self.shading_normal, to_light)
         share = self._either(lambda: 1, lambda: cosine)
         reflected = self._counts(to_light) & (cosine > 0)
-        return to_light, self.albedo * dr.select(reflected, share, 0)
+        return self.albedo * dr.select(reflected, share, 0)
+
+    @property
+    def is_diffuse(self) -> Any:
+        """Whether the surface is diffuse, as far as the kernel has others."""
+        return self.exponent == DIFFUSE if self.features.phong else self.features.diffuse
 
     def _either(self, diffuse: Callable[[], Any], phong: Callable[[], Any]) -> Any:
         """What the surface's kind asks for; the kernel has no code for a kind that is missing."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import drjit as dr
@@ -109,10 +110,7 @@ class DeviceScene:
 def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     """Put the primitives on the device, as arrays of the backend ``types``."""
 
-    def array(values: NDArray[np.float64]) -> Float:
-        mapped = types.Float32(values.astype(np.float32).ravel())
-        return _own_copy(mapped) if len(mapped) else mapped
-
+    array = partial(to_device, types=types)
     triangles = primitives.triangles
     in_light_mesh = primitives.light_corners[len(primitives.light_facets) :]
     few_spheres = len(primitives.spheres) <= SPHERE_LIMIT
@@ -177,13 +175,16 @@ def _reach(primitives: Primitives, loose: list[int]) -> NDArray[np.float64]:
     return np.concatenate([reach, np.abs(primitives.triangles).max(axis=(1, 2), initial=0)])
 
 
-def _own_copy(mapped: Float) -> Float:
-    """Copy an array that still is NumPy's memory into Dr.Jit's.
+def to_device(values: NDArray[np.float64], types: ModuleType) -> Float:
+    """Numbers on the device, one row after the other, in memory of Dr.Jit's own.
 
     Rows are gathered in one piece from aligned memory only, and element by element from other:
     where NumPy's memory happens to lie would decide which kernel is compiled.
     """
-    copy = mapped * dr.opaque(type(mapped), 1)
+    mapped = types.Float32(values.astype(np.float32).ravel())
+    if not len(mapped):
+        return mapped
+    copy = mapped * dr.opaque(types.Float32, 1)
     dr.eval(copy)
     return copy
 

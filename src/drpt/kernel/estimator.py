@@ -28,6 +28,7 @@ class Mode(StrEnum):
     EXPLICIT_UNIFORM = "explicit-uniform"
     EXPLICIT = "explicit"
     MIS = "mis"
+    GUIDED = "guided"
 
     # The names that the rendering course gives them.
     IMPLICIT_UNIFORM_SAMPLING = IMPLICIT_UNIFORM
@@ -42,22 +43,17 @@ class Mode(StrEnum):
     @property
     def samples_brdf(self) -> bool:
         """Whether the next direction follows the BRDF; else it is uniform on the sphere."""
-        return self in (Mode.IMPLICIT, Mode.EXPLICIT, Mode.MIS)
+        return self in (Mode.IMPLICIT, Mode.EXPLICIT, Mode.MIS, Mode.GUIDED)
 
     @property
     def samples_lights(self) -> bool:
         """Whether every vertex looks for direct light by a sample of a light."""
-        return self in (Mode.EXPLICIT_UNIFORM, Mode.EXPLICIT, Mode.MIS)
+        return self in (Mode.EXPLICIT_UNIFORM, Mode.EXPLICIT, Mode.MIS, Mode.GUIDED)
 
     @property
     def samples_cones(self) -> bool:
         """Whether light samples of a sphere keep to its visible cone; else to its whole area."""
-        return self in (Mode.EXPLICIT, Mode.MIS)
-
-    @property
-    def counts_hits(self) -> bool:
-        """Whether a path that runs into a light after a bounce collects its radiance."""
-        return self in (Mode.IMPLICIT_UNIFORM, Mode.IMPLICIT, Mode.MIS)
+        return self in (Mode.EXPLICIT, Mode.MIS, Mode.GUIDED)
 
 
 @dataclass(frozen=True)
@@ -78,6 +74,8 @@ class Features:
         Samples of lights of that kind.
     mis
         Weights for both ways to find a light.
+    guiding
+        Directions towards what reflects much light, from diffuse facets.
     regeneration
         A path starts where another one has ended, instead of waiting for its neighbours: in open
         scenes, with 3 bounces or more.
@@ -97,6 +95,7 @@ class Features:
     sphere_light_samples: bool
     triangle_light_samples: bool
     mis: bool
+    guiding: bool
     regeneration: bool
     shared_rays: bool
 
@@ -168,7 +167,15 @@ def _light_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, 
         "light_choice": _decide(choice, *sampling, (lights > 1, "there is one light")),
         "sphere_light_samples": _some(spheres, "sphere light", *sampling),
         "triangle_light_samples": _some(lights - spheres, "triangle light", *sampling),
-        "mis": _decide(both, *sampling, (mode.counts_hits, f"mode {mode} weights nothing")),
+        "mis": _decide(both, *sampling, _counts_hits(primitives, mode)),
+        "guiding": _decide(
+            f"mode {mode} goes where patches reflect much light",
+            *sampling,
+            (mode is Mode.GUIDED, f"mode {mode} follows the BRDF"),
+            (bounces > 1, "1 bounce: nothing comes after the direct light"),
+            (len(primitives.facets) > 0, "there are no facets, which alone have patches"),
+            (bool(primitives.diffuse[: len(primitives.facets)].any()), "no facet is diffuse"),
+        ),
     }
 
 
@@ -241,7 +248,7 @@ def _ray_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fa
         "last_ray": _decide(
             f"mode {mode} counts the light that it runs into",
             *_reflecting(primitives, bounces),
-            (mode.counts_hits, f"mode {mode} counts no light that it runs into"),
+            _counts_hits(primitives, mode),
         ),
     }
 
@@ -263,6 +270,16 @@ def _sampling(primitives: Primitives, bounces: int, mode: Mode) -> tuple[Need, .
         *_reflecting(primitives, bounces),
         (mode.samples_lights, f"mode {mode} samples no light"),
     )
+
+
+def _counts_hits(primitives: Primitives, mode: Mode) -> Need:
+    """Whether a path that runs into a light after a bounce collects its radiance."""
+    if mode is Mode.GUIDED:
+        sphere = len(primitives.radiance) == primitives.sphere_lights == 1
+        otherwise = "light samples of one sphere have all of its light on diffuse surfaces"
+        return not (sphere and primitives.diffuse.all()), otherwise
+    counts = mode in (Mode.IMPLICIT_UNIFORM, Mode.IMPLICIT, Mode.MIS)
+    return counts, f"mode {mode} counts no light that it runs into"
 
 
 def _decide(reason: str, *needs: Need) -> Fact:

@@ -132,7 +132,7 @@ class _FirstHitTracer(Tracer, ABC):
         reflects = hit.valid & (hit.primitive < self.scene.first_light)
         brdf = make_brdf(self.scene, self.features, hit._replace(valid=reflects), -ray.direction)
         feature = dr.select(hit.valid, self._feature(ray, hit, brdf), 0)
-        return Vertex(path._replace(radiance=feature), hit, brdf)
+        return Vertex(path._replace(radiance=feature), hit, brdf, path.patch)
 
     @abstractmethod
     def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:

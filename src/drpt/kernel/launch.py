@@ -14,6 +14,7 @@ from drpt.kernel.camera import DeviceCamera, make_camera
 from drpt.kernel.denormals import flush_denormals
 from drpt.kernel.device_scene import DeviceScene, upload
 from drpt.kernel.estimator import Features
+from drpt.kernel.learning import learn
 from drpt.kernel.path import Tracer
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SAMPLERS, SobolSampler
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.estimator import Mode
+    from drpt.kernel.guide import Guide
     from drpt.kernel.path import Path
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
@@ -175,7 +177,8 @@ def make_launcher(
     features = Features.of(primitives, bounces, mode)
     if not (features.diffuse or features.phong):
         bounces = 0
-    tracer = Tracer(device_scene, features, mode, bounces)
+    guide = learned(scene.shapes, types) if features.guiding else None
+    tracer = Tracer(device_scene, features, mode, bounces, guide)
     camera = make_camera(scene.camera, primitives.origin, device_scene.types)
     paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
     return Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray, primitives)
@@ -188,6 +191,12 @@ def prepare(shapes: tuple[Shape, ...], types: ModuleType) -> tuple[Primitives, D
     if len(primitives.triangles) or len(primitives.light_corners) > len(primitives.light_facets):
         types = import_module(f"{types.__name__}.ad")  # Mitsuba's, for its meshes
     return primitives, upload(primitives, types)
+
+
+@lru_cache(maxsize=1)
+def learned(shapes: tuple[Shape, ...], types: ModuleType) -> Guide:
+    """What is known of shapes with diffuse facets: kept like them."""
+    return learn(*prepare(shapes, types))
 
 
 def _seed_word(seed: int) -> int:

@@ -24,6 +24,7 @@ import drjit as dr
 
 from drpt.kernel.brdf import Brdf, make_brdf
 from drpt.kernel.camera import Ray
+from drpt.kernel.guide import GUIDED, NOWHERE
 from drpt.kernel.intersect import Hit, closest_hit, occluded
 from drpt.kernel.light import (
     LightSample,
@@ -33,14 +34,15 @@ from drpt.kernel.light import (
     power_heuristic,
     sample_light,
 )
-from drpt.kernel.vec import vec3
+from drpt.kernel.vec import vec2, vec3
 from drpt.kernel.warp import sphere_pdf, square_to_sphere
 
 if TYPE_CHECKING:
-    from drjit.auto import Array3f, Bool, Float, UInt32
+    from drjit.auto import Array2f, Array3f, Bool, Float, UInt32
 
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features, Mode
+    from drpt.kernel.guide import Guide
     from drpt.kernel.sampler import Sampler
 
 
@@ -56,7 +58,9 @@ class Path(NamedTuple):
     active: Bool  # whether there is a next vertex
     beta: Array3f  # throughput up to it
     normal: Array3f  # shading normal where the ray starts, for MIS
-    pdf: Float  # density of the direction by the BRDF, for MIS
+    pdf: Float  # density of the direction by the BRDF, for MIS and path guiding
+    patch: UInt32  # of the guide, where the ray starts; 0 where nothing is guided
+    aim: UInt32  # facet to which the guide aimed it
     radiance: Array3f  # collected so far
     rays: UInt32  # traced so far
 
@@ -67,6 +71,16 @@ class Vertex(NamedTuple):
     path: Path
     hit: Hit
     brdf: Brdf
+    patch: UInt32  # of the guide; 0 where nothing is guided
+
+
+class Turn(NamedTuple):
+    """Where a path goes on: ``weight`` is f cos θ / p, as far as p is known before it arrives."""
+
+    direction: Array3f
+    weight: Array3f
+    pdf: Float
+    aim: UInt32
 
 
 @dataclass
@@ -77,6 +91,7 @@ class Tracer:
     features: Features
     mode: Mode
     bounces: int
+    guide: Guide | None = None
 
     def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
         """What camera rays meet, and the light that it sends."""
@@ -92,6 +107,8 @@ class Tracer:
             beta=types.Array3f(1),
             normal=types.Array3f(0),
             pdf=types.Float32(dr.inf),
+            patch=types.UInt32(0),
+            aim=types.UInt32(NOWHERE),
             radiance=types.Array3f(0),
             rays=types.UInt32(0),
         )
@@ -125,7 +142,12 @@ class Tracer:
         """How many vertices a path has, beside the eye; the last one only emits."""
         if not self.features.emission:
             return 0
-        return self.bounces + 1 if self.bounces == 0 or self.mode.counts_hits else self.bounces
+        return self.bounces + 1 if self.bounces == 0 or self.counts_hits else self.bounces
+
+    @property
+    def counts_hits(self) -> bool:
+        """Whether a path that runs into a light after a bounce collects its radiance."""
+        return self.features.mis or not self.mode.samples_lights
 
     def step(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Path:
         """Follow paths over their vertex number ``depth``; they are active if there is a next."""
@@ -140,31 +162,78 @@ class Tracer:
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
         is_first: Any = depth == 0
         hit = closest_hit(scene, features, ray, path.active)
-        if self.mode.counts_hits or is_first is not False:
-            counts = True if self.mode.counts_hits else is_first
+        patch = path.patch
+        if self.guide is not None:
+            patch = self.guide.patch_of(hit)
+            if is_first is not True:
+                path, hit = self._arrive_guided(path, hit, patch, self.guide)
+        if self.counts_hits or is_first is not False:
+            counts = True if self.counts_hits else is_first
             weighted = features.mis and is_first is not True
             emitted = self._emission(path, hit, counts, weighted=weighted)
             radiance = radiance + path.beta * emitted
         reflects = hit.primitive < scene.first_light
         hit = hit._replace(valid=hit.valid & reflects & (depth < self.bounces))
         brdf = make_brdf(scene, features, hit, -ray.direction)
+        vertex = Vertex(path, hit, brdf, dr.select(brdf.is_diffuse, patch, 0))
         if features.direct_light and not (isinstance(depth, int) and depth == self.bounces):
-            light, traced = self._direct(hit, brdf, sampler, depth)
+            light, traced = self._direct(vertex, sampler, depth)
             radiance = radiance + path.beta * light
             rays = rays + dr.select(traced, 1, 0)
-        return Vertex(path._replace(radiance=radiance, rays=rays), hit, brdf)
+        return vertex._replace(path=path._replace(radiance=radiance, rays=rays))
+
+    def _arrive_guided(
+        self, path: Path, hit: Hit, patch: UInt32, guide: Guide
+    ) -> tuple[Path, Hit]:
+        """Weigh both ways to choose a direction; what has missed its aim is lost."""
+        lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
+        density = guide.density(path.patch, patch)
+        guided = GUIDED * density * dr.square(hit.distance)
+        cosine = dr.abs(dr.dot(hit.normal, path.direction))
+        share = dr.select(density > 0, path.pdf * cosine / (path.pdf * cosine + guided), 1)
+        beta = path.beta * dr.select(lost, 0, share)
+        return path._replace(beta=beta), hit._replace(valid=hit.valid & ~lost)
 
     def leave(self, vertex: Vertex, sampler: Sampler, depth: int | UInt32) -> Path:
         """Choose where a path goes on."""
-        path, hit, brdf = vertex
-        direction, weight = self._next_direction(brdf, sampler, depth)
-        beta = path.beta * weight
+        path, hit = vertex.path, vertex.hit
+        turn = self._turn(vertex, sampler.next_2d(_decision(depth, 2)))
+        beta = path.beta * turn.weight
         active = hit.valid & (depth < self.vertices - 1)
         active &= ~(dr.max(beta) <= 0)  # not a number goes on, to be counted
-        path = path._replace(origin=hit.point, direction=direction, active=active, beta=beta)
-        if not self.features.mis:
-            return path
-        return path._replace(normal=hit.shading_normal, pdf=brdf.pdf(direction))
+        return path._replace(
+            origin=hit.point,
+            direction=turn.direction,
+            active=active,
+            beta=beta,
+            normal=hit.shading_normal if self.features.mis else path.normal,
+            pdf=turn.pdf,
+            patch=vertex.patch,
+            aim=turn.aim,
+        )
+
+    def _turn(self, vertex: Vertex, u: Array2f) -> Turn:
+        """The direction in which a path goes on."""
+        brdf, types = vertex.brdf, self.scene.types
+        nowhere = types.UInt32(NOWHERE)
+        if not self.mode.samples_brdf:
+            direction = square_to_sphere(u)
+            return Turn(direction, brdf.eval(direction) / sphere_pdf(), vertex.path.pdf, nowhere)
+        if self.guide is None:
+            direction, weight = brdf.sample(u)
+            pdf = brdf.pdf(direction) if self.features.mis else vertex.path.pdf
+            return Turn(direction, weight, pdf, nowhere)
+        guided = (vertex.patch > 0) & (u.x < GUIDED)
+        share = self._unguided(vertex)
+        u = vec2(dr.select(guided, u.x / GUIDED, (u.x - (1 - share)) / share), u.y)
+        aimed, facet = self.guide.aim(vertex.patch, vertex.hit.point, u, guided)
+        direction = dr.select(guided, aimed, brdf.sample(u)[0])
+        aim = dr.select(guided, facet, NOWHERE)
+        return Turn(direction, brdf.weight(direction) / share, share * brdf.pdf(direction), aim)
+
+    def _unguided(self, vertex: Vertex) -> Float:
+        """The share of the directions from there that follow the BRDF."""
+        return dr.select(vertex.patch > 0, self.scene.types.Float32(1 - GUIDED), 1)
 
     def _emission(self, path: Path, hit: Hit, counts: Bool | bool, *, weighted: bool) -> Array3f:
         """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
@@ -182,13 +251,17 @@ class Tracer:
         return dr.select(lit, radiance, 0)
 
     def _direct(
-        self, hit: Hit, brdf: Brdf, sampler: Sampler, depth: int | UInt32
+        self, vertex: Vertex, sampler: Sampler, depth: int | UInt32
     ) -> tuple[Array3f, Bool]:
         """Direct light by one sample of one light, and where that took a shadow ray."""
+        hit, brdf = vertex.hit, vertex.brdf
         light, sample = self.light_sample(hit, sampler, depth)
         value = brdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
         if self.features.mis:
-            value *= power_heuristic(brdf.pdf(sample.direction) * sample.inverse_pdf)
+            pdf = brdf.pdf(sample.direction)
+            if self.guide is not None:
+                pdf *= self._unguided(vertex)
+            value *= power_heuristic(pdf * sample.inverse_pdf)
         traced = hit.valid & ~(dr.max(value) <= 0)
         ray = Ray(hit.point, sample.direction)
         shadow = occluded(self.scene, ray, sample.distance, light, traced)
@@ -203,16 +276,6 @@ class Tracer:
         choice = choose_light(self.scene, at, hit.valid, number)
         u = sampler.next_2d(_decision(depth, 1))
         return choice.light, sample_light(self.scene, self.features, self.mode, at, choice, u)
-
-    def _next_direction(
-        self, brdf: Brdf, sampler: Sampler, depth: int | UInt32
-    ) -> tuple[Array3f, Array3f]:
-        """The direction in which a path goes on, and its weight f cos θ / p."""
-        u = sampler.next_2d(_decision(depth, 2))
-        if self.mode.samples_brdf:
-            return brdf.sample(u)
-        direction = square_to_sphere(u)
-        return direction, brdf.eval(direction) / sphere_pdf()
 
 
 def _decision(depth: int | UInt32, kind: int) -> int | UInt32:
