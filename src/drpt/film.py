@@ -61,13 +61,15 @@ class Film:
         starts: NDArray[np.int64],
         size: int,
     ) -> None:
-        for _ in range((size // self.size).bit_length() - 1):
+        doublings = (size // self.size).bit_length() - 1
+        for _ in range(doublings if self.samples else 0):
             blocks[: BLOCKS // 2] = blocks[0::2] + blocks[1::2]
             blocks[BLOCKS // 2 :] = 0
         block = starts // size
         if len(block) > 1 + block[-1] - block[0]:  # several runs of a block
             sums = np.add.reduceat(sums, np.flatnonzero(np.diff(block, prepend=-1)), axis=0)
-        blocks[block[0] : block[-1] + 1] += sums.astype(np.float32)
+        theirs = blocks[block[0] : block[-1] + 1]
+        np.add(theirs, sums, out=theirs, casting="same_kind")  # memory that is new takes longest
 
     def _size_for(self, samples: int, run: int) -> int:
         size = max(self.size, run)

@@ -126,11 +126,11 @@ class Launcher:
         if not self.tracer.features.emission:
             return Sums(np.zeros((lanes, work.pixels, 3)), 0, 0)
         totals = self._trace(self._lanes(work, lanes))
+        radiance = dr.ravel(totals.radiance)  # by the kernel that makes it: a copy takes as long
         with flush_denormals():
-            dr.eval(*totals)
+            dr.eval(radiance, totals.rays, totals.non_finite)
             dr.sync_thread()
-        by_lane = np.stack([np.array(channel) for channel in totals.radiance], axis=-1)
-        by_pixel = by_lane.reshape(lanes, work.pixels, 3)
+        by_pixel = radiance.numpy().reshape(lanes, work.pixels, 3)
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 
     def _lanes(self, work: Work, lanes: int) -> Lanes:
@@ -209,4 +209,4 @@ def _word_of(seed: int, samples: range) -> int:
 
 
 def _total(counts: UInt32) -> int:
-    return int(np.array(counts).sum(dtype=np.int64))
+    return int(counts.numpy().sum(dtype=np.int64))
