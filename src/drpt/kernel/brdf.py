@@ -17,6 +17,7 @@ from drpt.kernel.warp import (
     INV_PI,
     cosine_hemisphere_pdf,
     phong_lobe_pdf,
+    phong_lobe_sample_pdf,
     square_to_cosine_hemisphere,
     square_to_phong_lobe,
 )
@@ -29,6 +30,14 @@ if TYPE_CHECKING:
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
     from drpt.kernel.intersect import Hit
+
+
+class BrdfSample(NamedTuple):
+    """A direction to a light, its weight, eval / pdf, and its density per solid angle."""
+
+    direction: Array3f
+    weight: Array3f
+    pdf: Float
 
 
 class Brdf(NamedTuple):
@@ -59,13 +68,17 @@ class Brdf(NamedTuple):
             lambda: self._phong_pdf(to_light),
         )
 
-    def sample(self, u: Array2f) -> tuple[Array3f, Array3f]:
-        """Solid angle: a direction ω_i, and its weight, eval / pdf."""
+    def sample(self, u: Array2f) -> BrdfSample:
+        """Solid angle: a direction ω_i; neither its weight nor its density takes a power."""
         local = self._either(
             lambda: square_to_cosine_hemisphere(u), lambda: square_to_phong_lobe(u, self.exponent)
         )
         to_light = frame(self._either(lambda: self.shading_normal, self._mirrored)).to_world(local)
-        return to_light, self.weight(to_light)
+        pdf = self._either(
+            lambda: cosine_hemisphere_pdf(local.z),
+            lambda: phong_lobe_sample_pdf(u, local.z, self.exponent),
+        )
+        return BrdfSample(to_light, self.weight(to_light), pdf)
 
     def weight(self, to_light: Array3f) -> Array3f:
         """eval / pdf of a direction ω_i; neither is divided for."""

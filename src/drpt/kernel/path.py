@@ -35,7 +35,7 @@ from drpt.kernel.light import (
     sample_light,
 )
 from drpt.kernel.vec import vec2, vec3
-from drpt.kernel.warp import sphere_pdf, square_to_sphere
+from drpt.kernel.warp import cosine_hemisphere_pdf, sphere_pdf, square_to_sphere
 
 if TYPE_CHECKING:
     from drjit.auto import Array2f, Array3f, Bool, Float, UInt32
@@ -220,16 +220,19 @@ class Tracer:
             direction = square_to_sphere(u)
             return Turn(direction, brdf.eval(direction) / sphere_pdf(), vertex.path.pdf, nowhere)
         if self.guide is None:
-            direction, weight = brdf.sample(u)
-            pdf = brdf.pdf(direction) if self.features.mis else vertex.path.pdf
-            return Turn(direction, weight, pdf, nowhere)
+            sample = brdf.sample(u)
+            pdf = sample.pdf if self.features.mis else vertex.path.pdf
+            return Turn(sample.direction, sample.weight, pdf, nowhere)
         guided = (vertex.patch > 0) & (u.x < GUIDED)
         share = self._unguided(vertex)
         u = vec2(dr.select(guided, u.x / GUIDED, (u.x - (1 - share)) / share), u.y)
         aimed, facet = self.guide.aim(vertex.patch, vertex.hit.point, u, guided)
-        direction = dr.select(guided, aimed, brdf.sample(u)[0])
+        sample = brdf.sample(u)
+        direction = dr.select(guided, aimed, sample.direction)
+        of_aimed = cosine_hemisphere_pdf(dr.dot(brdf.shading_normal, aimed))
+        pdf = share * dr.select(guided, of_aimed, sample.pdf)
         aim = dr.select(guided, facet, NOWHERE)
-        return Turn(direction, brdf.weight(direction) / share, share * brdf.pdf(direction), aim)
+        return Turn(direction, brdf.weight(direction) / share, pdf, aim)
 
     def _unguided(self, vertex: Vertex) -> Float:
         """The share of the directions from there that follow the BRDF."""

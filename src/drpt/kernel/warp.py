@@ -99,6 +99,11 @@ def phong_lobe_pdf(below_pole: Float, exponent: Float) -> Float:
     return (exponent + 1) * INV_TWO_PI * power_near_pole(below_pole, exponent)
 
 
+def phong_lobe_sample_pdf(u: Array2f, cos_theta: Float, exponent: Float) -> Float:
+    """Density of the point to which :func:`square_to_phong_lobe` maps ``u``; cos^(α+1) θ is 1 − u."""
+    return (exponent + 1) * INV_TWO_PI * (1 - u.x) / cos_theta
+
+
 def power_near_pole(below_pole: Float, exponent: Float) -> Float:
     """cos^α θ from 1 − cos θ, exact where cos θ rounds to 1; 0 where cos θ < 0, also for α = 0."""
     above_plane = below_pole < 1
