@@ -223,7 +223,7 @@ def _weights() -> list[AbstractContextManager[Any]]:
         return found * _opaque(type(found.x), 0) if weighted else found
 
     return [
-        patch.object(Mode, "counts_hits", property(lambda self: self.samples_lights)),
+        *features(mis=True)(),
         patch.object(Brdf, "pdf", no_pdf),
         patch.object(path.Tracer, "_emission", weighted),
     ]

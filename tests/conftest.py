@@ -16,9 +16,10 @@ TYPES = backend.load()
 @pytest.fixture(autouse=True)
 def _forget_shapes() -> None:
     """Let no test see shapes that another one has prepared with other constants."""
-    from drpt.kernel.launch import prepare
+    from drpt.kernel.launch import learned, prepare
 
     prepare.cache_clear()
+    learned.cache_clear()
 
 
 def to_device(values: npt.ArrayLike) -> Any:

@@ -94,13 +94,13 @@ def with_everything(mode: drpt.Mode) -> Skip:
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "name"), [*enumerate(builtin_names())])
 def test_built_in_scenes_need_no_more(number: int, name: str) -> None:
-    mode = tuple(drpt.Mode)[number % 5]
+    mode = tuple(drpt.Mode)[number % 6]
     assert_same(with_everything(mode), resized(drpt.load_scene(name), SIDE))
 
 
 @pytest.mark.parametrize("seed", [5, *(pytest.param(n, marks=pytest.mark.slow) for n in range(5))])
 def test_random_scenes_need_no_more(seed: int) -> None:
-    mode = tuple(drpt.Mode)[seed % 5]
+    mode = tuple(drpt.Mode)[seed % 6]
     assert_same(with_everything(mode), tame_scene(Random(seed), SIDE))
 
 

@@ -75,7 +75,7 @@ def of_albedo(exponent: float) -> Measure:
 
     def error(height: float, samples: int) -> float:
         theta = radians(90 - height)
-        _, weight = _brdf(exponent, theta).sample(sobol(samples))
+        weight = _brdf(exponent, theta).sample(sobol(samples)).weight
         expected = phong_directional_albedo(ALBEDO, exponent, theta)
         return relative(float(to_host(weight.x).mean()), expected)
 

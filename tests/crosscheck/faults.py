@@ -192,8 +192,8 @@ def renormalised(size: float) -> Iterator[None]:
         return original_eval(self, to_light) * factor(self)
 
     def sample(self: Brdf, u: Any) -> Any:
-        to_light, weight = original_sample(self, u)
-        return to_light, weight * factor(self)
+        sample = original_sample(self, u)
+        return sample._replace(weight=sample.weight * factor(self))
 
     original_eval, original_sample = Brdf.eval, Brdf.sample
     with patch.object(Brdf, "eval", evaluate), patch.object(Brdf, "sample", sample):

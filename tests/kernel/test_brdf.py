@@ -147,16 +147,25 @@ class TestValues:
         self, make_case: Callable[[Material], Case], material: Material
     ) -> None:
         case = make_case(material)
-        wi, weight = case.device.sample(unit_square(len(case.wo)))
+        wi, weight, _ = case.device.sample(unit_square(len(case.wo)))
         product = to_host(weight) * to_host(case.device.pdf(wi))[:, None]
         value = to_host(case.device.eval(wi))
         np.testing.assert_allclose(product, value, rtol=WEIGHT, atol=1e-30)
+
+    def test_density_of_a_sample_is_that_of_its_direction(
+        self, make_case: Callable[[Material], Case], material: Material
+    ) -> None:
+        case = make_case(material)
+        wi, _, pdf = case.device.sample(unit_square(len(case.wo)))
+        expected = to_host(case.device.pdf(wi))
+        error = value_error(material) * expected.max()
+        np.testing.assert_allclose(to_host(pdf), expected, rtol=0, atol=error)
 
     def test_weight_is_zero_where_a_direction_does_not_count(
         self, make_case: Callable[[Material], Case], material: Material
     ) -> None:
         case = make_case(material)
-        wi, weight = (to_host(v) for v in case.device.sample(unit_square(len(case.wo))))
+        wi, weight, _ = (to_host(v) for v in case.device.sample(unit_square(len(case.wo))))
         wi = normalize(wi)
         sides = [dot(n, w) > 0 for n in (case.ng, case.ns) for w in (case.wo, wi)]
         clear = case.clear(wi)
@@ -193,7 +202,7 @@ def test_reciprocity(material: Material) -> None:
 @pytest.mark.parametrize("degrees", TILTS)
 @pytest.mark.parametrize("material", MATERIALS)
 def test_directional_albedo(material: Material, degrees: float) -> None:
-    _, weight = tilted(material, degrees).device.sample(sobol(SOBOL_SAMPLES))
+    _, weight, _ = tilted(material, degrees).device.sample(sobol(SOBOL_SAMPLES))
     share = 1.0
     if isinstance(material, Phong):
         share = phong_directional_albedo(1, material.exponent, radians(degrees))
@@ -217,7 +226,7 @@ def lost_share(exponent: float, theta: float) -> float:
 @pytest.mark.parametrize("degrees", [30.0, 70.0, 89.0])
 @pytest.mark.parametrize("exponent", EXPONENTS)
 def test_share_lost_below_the_horizon(exponent: float, degrees: float) -> None:
-    _, weight = tilted(Phong(COLOUR, exponent), degrees).device.sample(sobol(SOBOL_SAMPLES))
+    _, weight, _ = tilted(Phong(COLOUR, exponent), degrees).device.sample(sobol(SOBOL_SAMPLES))
     lost = (to_host(weight.x) == 0).mean()
     assert lost == pytest.approx(lost_share(exponent, radians(degrees)), abs=1e-4)
 
@@ -254,7 +263,7 @@ def test_chi2_detects_a_biased_width(material: Phong) -> None:
 def test_ends_of_the_unit_interval(material: Material, degrees: float) -> None:
     ends = 0, 2.0**-24, 0.5, 1 - 2.0**-24
     u = to_device([(x, y) for x in ends for y in ends])
-    wi, weight = (to_host(v) for v in tilted(material, degrees).device.sample(u))
+    wi, weight, _ = (to_host(v) for v in tilted(material, degrees).device.sample(u))
     np.testing.assert_allclose(np.linalg.norm(wi, axis=1), 1, rtol=0, atol=UNIT)
     assert ((weight >= 0) & (weight <= np.array(COLOUR) * (1 + UNIT))).all()
     assert (weight[wi[:, 2] < 0] == 0).all()
@@ -263,7 +272,7 @@ def test_ends_of_the_unit_interval(material: Material, degrees: float) -> None:
 @pytest.mark.parametrize("material", [Diffuse(0), Phong(0, 10)])
 def test_black_reflects_nothing(material: Material) -> None:
     case = tilted(material, 30)
-    wi, weight = case.device.sample(unit_square(100))
+    wi, weight, _ = case.device.sample(unit_square(100))
     assert (to_host(weight) == 0).all()
     assert (to_host(case.device.eval(wi)) == 0).all()
 

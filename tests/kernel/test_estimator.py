@@ -38,6 +38,10 @@ STRIPES = drpt.Mesh(LAYERS, np.arange(3 * MANY).reshape(-1, 3), material=DIFFUSE
 PANELS = drpt.Mesh(LAYERS, STRIPES.faces, radiance=1)
 BALLS = [drpt.Sphere((3 * x, 0, 0), 1, material=DIFFUSE) for x in range(SPHERE_LIMIT + 1)]
 IMPLICIT, EXPLICIT = {"mode": "implicit"}, {"mode": "explicit"}
+GUIDED: dict[str, Any] = {"mode": "guided"}
+ONE_SPHERE = "light samples of one sphere have all of its light on diffuse surfaces"
+NO_FACETS = "there are no facets, which alone have patches"
+ONE_BOUNCE = "1 bounce: nothing comes after the direct light"
 
 COURSE_NAMES = {
     "IMPLICIT_UNIFORM_SAMPLING": "implicit-uniform",
@@ -61,8 +65,8 @@ def facts(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> dict[str, Fact
     return feature_facts(*what) | layout_facts(*what)
 
 
-def test_there_are_five_modes() -> None:
-    names = ["implicit-uniform", "implicit", "explicit-uniform", "explicit", "mis"]
+def test_there_are_six_modes() -> None:
+    names = ["implicit-uniform", "implicit", "explicit-uniform", "explicit", "mis", "guided"]
     assert [str(mode) for mode in Mode] == names
     assert drpt.Mode is Mode
     assert all(Mode(name) == name for name in names)
@@ -82,28 +86,28 @@ def test_other_names_are_refused(name: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "samples_brdf", "samples_lights", "samples_cones", "counts_hits"),
+    ("mode", "samples_brdf", "samples_lights", "samples_cones"),
     [
-        ("implicit-uniform", False, False, False, True),
-        ("implicit", True, False, False, True),
-        ("explicit-uniform", False, True, False, False),
-        ("explicit", True, True, True, False),
-        ("mis", True, True, True, True),
+        ("implicit-uniform", False, False, False),
+        ("implicit", True, False, False),
+        ("explicit-uniform", False, True, False),
+        ("explicit", True, True, True),
+        ("mis", True, True, True),
+        ("guided", True, True, True),
     ],
 )
 def test_what_modes_do(
-    mode: str, samples_brdf: bool, samples_lights: bool, samples_cones: bool, counts_hits: bool
+    mode: str, samples_brdf: bool, samples_lights: bool, samples_cones: bool
 ) -> None:
     found = Mode(mode)
     assert found.samples_brdf is samples_brdf
     assert found.samples_lights is samples_lights
     assert found.samples_cones is samples_cones
-    assert found.counts_hits is counts_hits
 
 
 def test_a_scene_of_everything_has_all_features() -> None:
     everything = set(Features.__dataclass_fields__) - {"shared_rays", "regeneration"}
-    assert features(BALL, TRIANGLE, SMOOTH, LAMP, PANEL) == everything
+    assert features(BALL, TRIANGLE, SMOOTH, LAMP, PANEL, mode="guided") == everything
 
 
 def test_spheres_alone() -> None:
@@ -201,7 +205,16 @@ def test_every_feature_is_told() -> None:
         ("direct_light", (False, "mode implicit samples no light"), [BALL, LAMP], IMPLICIT),
         ("light_choice", (False, "there is one light"), [BALL, LAMP], {}),
         ("light_choice", (True, "one of 2 lights at every vertex"), [BALL, LAMP, PANEL], {}),
-        ("mis", (False, "mode explicit weights nothing"), [BALL, LAMP], EXPLICIT),
+        ("mis", (False, "mode explicit counts no light that it runs into"), [BALL, LAMP], EXPLICIT),
+        ("mis", (False, ONE_SPHERE), [TRIANGLE, LAMP], GUIDED),
+        ("mis", (True, "mode guided finds lights in two ways"), [TRIANGLE, LAMP, PANEL], GUIDED),
+        ("mis", (True, "mode guided finds lights in two ways"), [TRIANGLE, SMOOTH, LAMP], GUIDED),
+        ("guiding", (True, "mode guided goes where patches reflect much light"), [*HOUSE], GUIDED),
+        ("guiding", (False, "mode mis follows the BRDF"), [*HOUSE], {}),
+        ("guiding", (False, NO_FACETS), [BALL, LAMP], GUIDED),
+        ("guiding", (False, NO_FACETS), [STRIPES, LAMP], GUIDED),
+        ("guiding", (False, "no facet is diffuse"), [BALL, SMOOTH, LAMP], GUIDED),
+        ("guiding", (False, ONE_BOUNCE), [*HOUSE], GUIDED | {"bounces": 1}),
         ("regeneration", (False, "the scene is a room"), [ROOM, LAMP], {"bounces": 3}),
         ("regeneration", (False, "2 bounces, less than 3"), [BALL, LAMP], {}),
         ("regeneration", (True, "an open scene, up to 3 bounces"), [BALL, LAMP], {"bounces": 3}),

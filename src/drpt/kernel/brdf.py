@@ -81,7 +81,7 @@ class Brdf(NamedTuple):
         return BrdfSample(to_light, self.weight(to_light), pdf)
 
     def weight(self, to_light: Array3f) -> Array3f:
-        """eval / pdf of a direction ω_i; neither is divided for."""
+        """Eval / pdf of a direction ω_i; neither is divided for."""
         cosine = dr.dot(self.shading_normal, to_light)
         share = self._either(lambda: 1, lambda: cosine)
         reflected = self._counts(to_light) & (cosine > 0)

@@ -109,7 +109,6 @@ class DeviceScene:
 
 def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     """Put the primitives on the device, as arrays of the backend ``types``."""
-
     array = partial(to_device, types=types)
     triangles = primitives.triangles
     in_light_mesh = primitives.light_corners[len(primitives.light_facets) :]

@@ -78,9 +78,7 @@ class Guide:
             dr.gather(types.Array4f, self._frames, 2 * hit.primitive + k, on_facet)
             for k in range(2)
         )
-        column, row = (
-            dr.fma(r[0], p.x, dr.fma(r[1], p.y, dr.fma(r[2], p.z, r[3]))) for r in rows
-        )
+        column, row = (dr.fma(r[0], p.x, dr.fma(r[1], p.y, dr.fma(r[2], p.z, r[3]))) for r in rows)
         inside = (column >= 0) & (column < COLUMNS) & (row >= 0) & (row < self._patches // COLUMNS)
         patch = types.UInt32(dr.fma(dr.floor(row), COLUMNS, column))
         return dr.select(inside, patch, 0)
@@ -114,11 +112,11 @@ def share_out(weights: Array, count: int) -> NDArray[np.intp]:
 def _known(patches: Patches, light: Array) -> Array:
     """What is known of each patch; where that is nothing, what is known of all together."""
     there = patches.facet >= 0
-    everywhere = light[there].sum(axis=0)
+    light = light * np.outer(there, there)
+    everywhere = light.sum(axis=0)
     if not everywhere.any():
         everywhere = patches.area
-    known = np.where(light.any(axis=1, keepdims=True), light, everywhere)
-    return known * there[:, None]
+    return np.where(light.any(axis=1, keepdims=True), light, everywhere) * there[:, None]
 
 
 def _slots(counts: NDArray[np.intp]) -> NDArray[np.uint32]:

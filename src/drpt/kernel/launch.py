@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -126,7 +126,9 @@ class Launcher:
         if not self.tracer.features.emission:
             return Sums(np.zeros((lanes, work.pixels, 3)), 0, 0)
         totals = self._trace(self._lanes(work, lanes))
-        radiance = dr.ravel(totals.radiance)  # by the kernel that makes it: a copy takes as long
+        radiance: Any = dr.ravel(
+            totals.radiance
+        )  # by the kernel that makes it: a copy takes as long
         with flush_denormals():
             dr.eval(radiance, totals.rays, totals.non_finite)
             dr.sync_thread()
@@ -178,7 +180,7 @@ def make_launcher(
     if not (features.diffuse or features.phong):
         bounces = 0
     guide = learned(scene.shapes, types) if features.guiding else None
-    tracer = Tracer(device_scene, features, mode, bounces, guide)
+    tracer = Tracer(device_scene, features, mode, bounces, guide=guide)
     camera = make_camera(scene.camera, primitives.origin, device_scene.types)
     paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
     return Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray, primitives)

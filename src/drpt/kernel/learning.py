@@ -25,6 +25,8 @@ from drpt.kernel.sampler import SobolSampler
 from drpt.kernel.vec import largest, vec3
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from drjit.auto import Array3f, Float, UInt32
     from numpy.typing import NDArray
 
@@ -82,9 +84,10 @@ class _Exchange:
         def trace(ray: UInt32, total: Float) -> tuple[UInt32, Float]:
             return ray + 1, total + self._ray(pair, receiver, sender, ray)
 
-        state: tuple[Any, ...] = (types.UInt32(0), dr.zeros(types.Float32, len(pair)))
         end = dr.opaque(types.UInt32, RAYS)
-        return dr.while_loop(state, lambda ray, _: ray < end, trace)[1] / RAYS
+        state: tuple[Any, ...] = (types.UInt32(0), dr.zeros(types.Float32, len(pair)))
+        goes_on: Callable[..., Any] = lambda ray, _: ray < end  # noqa: E731
+        return dr.while_loop(state, goes_on, trace)[1] / RAYS
 
     def _ray(self, pair: UInt32, receiver: UInt32, sender: UInt32, ray: UInt32) -> Float:
         """What one ray brings."""

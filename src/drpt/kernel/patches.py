@@ -25,7 +25,7 @@ ROWS = 16
 MOST_ROWS = 96
 """All facets together."""
 ROOM = 2.0**-16
-"""By which a grid is wider than its facet, relative to the coordinates: its edges may be rounded."""
+"""By which a grid is wider than its facet, relative to the coordinates: edges may be rounded."""
 
 
 class Patches(NamedTuple):
@@ -70,15 +70,15 @@ class _Grid(NamedTuple):
     def frame(self) -> Array:
         """The rows of `Patches.frames`."""
         right, up = (edge / (edge @ edge) for edge in (self.right, self.up))
-        return np.array(
-            [[*right, -right @ self.corner], [*up, self.first - up @ self.corner]]
-        )
+        return np.array([[*right, -right @ self.corner], [*up, self.first - up @ self.corner]])
 
 
 def make_patches(facets: Sequence[Facet]) -> Patches:
     """Cut facets into patches of about the same size."""
     frames = [_axes(facet) for facet in facets]
-    extents = np.array([np.ptp(f.corners @ a.T, axis=0) for f, a in zip(facets, frames, strict=True)])
+    extents = np.array(
+        [np.ptp(f.corners @ a.T, axis=0) for f, a in zip(facets, frames, strict=True)]
+    )
     size = np.sqrt(extents.prod(axis=1).sum() / PATCHES)
     while (counts := _cells(extents, size))[:, 1].sum() > max(MOST_ROWS, len(facets)):
         size *= np.sqrt(2)

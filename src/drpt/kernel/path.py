@@ -17,7 +17,7 @@ where ω' leads from x_i to a sampled point of a light, and V tells whether noth
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
@@ -91,7 +91,7 @@ class Tracer:
     features: Features
     mode: Mode
     bounces: int
-    guide: Guide | None = None
+    guide: Guide | None = field(default=None, kw_only=True)
 
     def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
         """What camera rays meet, and the light that it sends."""
@@ -182,9 +182,7 @@ class Tracer:
             rays = rays + dr.select(traced, 1, 0)
         return vertex._replace(path=path._replace(radiance=radiance, rays=rays))
 
-    def _arrive_guided(
-        self, path: Path, hit: Hit, patch: UInt32, guide: Guide
-    ) -> tuple[Path, Hit]:
+    def _arrive_guided(self, path: Path, hit: Hit, patch: UInt32, guide: Guide) -> tuple[Path, Hit]:
         """Weigh both ways to choose a direction; what has missed its aim is lost."""
         lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
         density = guide.density(path.patch, patch)

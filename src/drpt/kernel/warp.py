@@ -100,7 +100,7 @@ def phong_lobe_pdf(below_pole: Float, exponent: Float) -> Float:
 
 
 def phong_lobe_sample_pdf(u: Array2f, cos_theta: Float, exponent: Float) -> Float:
-    """Density of the point to which :func:`square_to_phong_lobe` maps ``u``; cos^(α+1) θ is 1 − u."""
+    """Density where :func:`square_to_phong_lobe` maps ``u`` to, as cos^(α+1) θ = 1 − u."""
     return (exponent + 1) * INV_TWO_PI * (1 - u.x) / cos_theta
 
 
