@@ -70,6 +70,9 @@ class DeviceScene:
         18 by smooth triangle: its corners, then the normals there.
     lights
         Rows of 4 by light: (radiance, area).
+    only_light
+        The rows of a light that is the only one in ``geometry`` and ``lights``: the same for all
+        lanes, which need not gather them.
     light_tree
         Which light is chosen, where there are several.
     light_corners
@@ -93,6 +96,7 @@ class DeviceScene:
     reflectance: Float
     smooth: Float
     lights: Float
+    only_light: tuple[Array4f, Array4f] | None
     light_tree: LightTree | None
     light_corners: Float
     light_count: int
@@ -102,9 +106,17 @@ class DeviceScene:
         """Normal and offset, or centre and radius."""
         return dr.gather(self.types.Array4f, self.geometry, primitive, active)
 
-    def light_row(self, light: UInt32, active: Any = True) -> Array4f:
+    def light_geometry_row(self, light: UInt32) -> Array4f:
+        """The same of a light."""
+        return (
+            self.only_light[0] if self.only_light else self.geometry_row(self.first_light + light)
+        )
+
+    def light_row(self, light: UInt32) -> Array4f:
         """Radiance and area of a light."""
-        return dr.gather(self.types.Array4f, self.lights, light, active)
+        if self.only_light:
+            return self.only_light[1]
+        return dr.gather(self.types.Array4f, self.lights, light)
 
 
 def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
@@ -118,6 +130,8 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     solids = primitives.solids
     loose = tuple(_loose(primitives, solids))
     reach = _reach(primitives, [number for number, *_ in loose])
+    geometry = np.concatenate([planes, primitives.spheres, lit_planes])
+    lights = np.column_stack([primitives.radiance, primitives.light_areas()])
     return DeviceScene(
         types=types,
         first_smooth=primitives.first_smooth,
@@ -132,12 +146,15 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
         sphere_tree=None if few_spheres else SphereTree(primitives.spheres, first, types, array),
-        geometry=array(np.concatenate([planes, primitives.spheres, lit_planes])),
+        geometry=array(geometry),
         reflectance=array(primitives.reflectance),
         smooth=array(
             np.concatenate([primitives.smooth_corners, primitives.smooth_normals], axis=1)
         ),
-        lights=array(np.column_stack([primitives.radiance, primitives.light_areas()])),
+        lights=array(lights),
+        only_light=(_uniform(geometry[-1], types), _uniform(lights[0], types))
+        if len(lights) == 1
+        else None,
         light_tree=_light_tree(primitives, types, array),
         light_corners=array(primitives.light_corners),
         light_count=len(primitives.radiance),
@@ -186,6 +203,11 @@ def to_device(values: NDArray[np.float64], types: ModuleType) -> Float:
     copy = mapped * dr.opaque(types.Float32, 1)
     dr.eval(copy)
     return copy
+
+
+def _uniform(row: NDArray[np.float64], types: ModuleType) -> Array4f:
+    """Four numbers that are inputs of the kernel, the same for all lanes."""
+    return types.Array4f(*(dr.opaque(types.Float32, float(value)) for value in row))
 
 
 def _ball(row: NDArray[np.float64], types: ModuleType) -> Ball:

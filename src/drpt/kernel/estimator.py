@@ -1,4 +1,4 @@
-"""The five estimators as static facts; what a kernel has for a scene, and why (host)."""
+"""The six estimators as static facts; what a kernel has for a scene, and why (host)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Mode(StrEnum):
 
     @property
     def samples_brdf(self) -> bool:
-        """Whether the next direction follows the BRDF; else it is uniform on the sphere."""
+        """Whether next directions follow the BRDF, if not a guide; else they are uniform."""
         return self in (Mode.IMPLICIT, Mode.EXPLICIT, Mode.MIS, Mode.GUIDED)
 
     @property

@@ -143,7 +143,7 @@ def _cap(scene: DeviceScene, at: Receiver, light: UInt32) -> _Cap:
     Close to the light it decides how much of its horizon is seen. A point that is not a number
     has a cap that is none, so that its samples are counted.
     """
-    row = scene.geometry_row(scene.first_light + light)
+    row = scene.light_geometry_row(light)
     to_center = vec3(row[0], row[1], row[2]) - at.point
     radius = row[3]
     distance = dr.norm(to_center)
@@ -159,7 +159,7 @@ def _cap(scene: DeviceScene, at: Receiver, light: UInt32) -> _Cap:
 def _aim_at_sphere(scene: DeviceScene, mode: Mode, at: Receiver, light: UInt32, u: Array2f) -> Aim:
     if mode.samples_cones:
         return _aim_at_cap(_cap(scene, at, light), at.normal, u)
-    row = scene.geometry_row(scene.first_light + light)
+    row = scene.light_geometry_row(light)
     normal = square_to_sphere(u)
     radius = row[3]
     target = dr.fma(normal, radius, vec3(row[0], row[1], row[2]))
@@ -182,7 +182,7 @@ def _aim_at_triangle(scene: DeviceScene, point: Array3f, light: UInt32, u: Array
     a, b, c = (dr.gather(scene.types.Array3f, scene.light_corners, 3 * index + k) for k in range(3))
     weights = square_to_triangle(u)
     target = a + weights.x * (b - a) + weights.y * (c - a)
-    row = scene.geometry_row(scene.first_light + light)
+    row = scene.light_geometry_row(light)
     return _aim_at_point(point, target, vec3(row[0], row[1], row[2]), _area(scene, light))
 
 

@@ -10,6 +10,7 @@ and with k bounces the radiance along the first ray is estimated by
     implicit    Σ_{i ≤ k+1}  beta_i L_e(x_i)
     explicit    L_e(x₁) + Σ_{i ≤ k}  beta_i f(x_i, ω') cos θ' L_e(ω') V(ω') / p_light(ω')
     mis         L_e(x₁) + both sums from there on, each term weighted by the power heuristic,
+    guided      as mis, or as explicit where that has next to no noise, with guided directions,
 
 where ω' leads from x_i to a sampled point of a light, and V tells whether nothing stands between
 (Kajiya 1986; Veach 1997, ch. 8–10).
