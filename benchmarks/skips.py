@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from drpt.kernel.device_scene import DeviceScene
-    from drpt.kernel.path import Path, Tracer, Vertex
+    from drpt.kernel.path import Tracer, Vertex
     from drpt.kernel.primitives import Primitives
     from drpt.scene import Shape
 
@@ -188,22 +188,24 @@ def _light_code() -> list[AbstractContextManager[Any]]:
 
 def _last_ray() -> list[AbstractContextManager[Any]]:
     """A ray after the last bounce, whose hit only the device knows to give nothing."""
+    from drpt.kernel.camera import Ray
+    from drpt.kernel.intersect import light_hit
     from drpt.kernel.path import Tracer
 
-    arrive = Tracer.arrive
-
-    def arrive_after_all(self: Tracer, path: Path, sampler: Any, depth: Any) -> Vertex:
+    def follow(self: Tracer, first: Vertex, sampler: Any) -> tuple[Any, Any]:
         import drjit as dr
 
-        vertex = arrive(self, path, sampler, depth)
-        none = _opaque(self.scene.types.UInt32, 2**32 - 1)
-        nothing = dr.select(vertex.hit.primitive == none, 1, 0)
-        path = vertex.path._replace(radiance=vertex.path.radiance + nothing)
-        return vertex._replace(path=path)
+        path = self.leave(first, sampler, 0)
+        for depth in range(1, self.bounces):
+            path = self.step(path, sampler, depth)
+        ray = Ray(path.origin, path.direction)
+        hit = light_hit(self.scene, self.features, ray, path.active)
+        nothing = dr.select(hit.valid, _opaque(self.scene.types.Float32, 0), 0)
+        return path.radiance + nothing, path.rays
 
     vertices = property(lambda self: self.bounces + 1)
     return [
-        patch.object(Tracer, "arrive", arrive_after_all),
+        patch.object(Tracer, "follow", follow),
         patch.object(Tracer, "vertices", vertices),
     ]
 

@@ -34,10 +34,16 @@ ORACLE = "NumPy oracle"
 
 
 def drpt(mode: Mode, sampler: str) -> Factory:
-    """Whole calls of `drpt.render`, with all that they do before and after the kernel."""
+    """Whole calls of `drpt.render`, with all that they do before and after the kernel.
+
+    Each learns anew where paths are guided, though drpt would know it from the call before.
+    """
 
     def load(scene: Scene, bounces: int) -> Render:
         def rendered(spp: int, seed: int) -> Picture:
+            from drpt.kernel.launch import learned
+
+            learned.cache_clear()
             result = render(scene, spp, bounces, mode, sampler=sampler, seed=seed)
             return Picture(result.image, result.rays)
 

@@ -357,7 +357,8 @@ def render(  # noqa: PLR0913 -- a setting each
         How often light bounces at most, from 0 to 65536: 0 shows the lights alone, 1 adds what
         they light, 2 one indirect bounce, …. Light of longer paths is missing from the picture.
     mode
-        A `Mode` or its name; all of them converge to the same picture.
+        A `Mode` or its name: ``"implicit-uniform"``, ``"implicit"``, ``"explicit-uniform"``,
+        ``"explicit"``, ``"mis"`` or ``"guided"``; all of them converge to the same picture.
     sampler
         ``"sobol"`` (Owen-scrambled Sobol' points) or ``"independent"``.
     seed

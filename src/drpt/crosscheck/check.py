@@ -157,7 +157,7 @@ def samples_needed(scene: Scene, bounces: int, mode: Mode) -> int:
     to sampled points of lights, where no MIS weighs them, and uniform ones.
     """
     lobes = [s.material.exponent for s in scene.shapes if isinstance(s.material, Phong)]
-    if not lobes or mode in (Mode.IMPLICIT, Mode.MIS):
+    if not lobes or mode in (Mode.IMPLICIT, Mode.MIS, Mode.GUIDED):
         return 0
     choices = min(bounces, 1) if mode.samples_brdf else bounces
     return int(MIN_EVENTS * (int(max(lobes)) + 1) ** choices)

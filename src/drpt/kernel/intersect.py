@@ -73,12 +73,41 @@ def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) 
         closer = met & (t <= nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
+    nearest, primitive = _or_light_triangle(scene, ray, active, nearest, primitive)
+    return _surface(scene, features, ray, nearest, primitive, active & (nearest < dr.inf))
+
+
+def light_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
+    """The first surface that a ray from a surface meets if that is a light, else nothing.
+
+    Few lights are looked for first, and where there is one, what stands before it.
+    """
+    if scene.sphere_tree is not None or scene.light_mesh is not None:
+        hit = closest_hit(scene, features, ray, active)
+        return hit._replace(valid=hit.valid & (hit.primitive >= scene.first_light))
+    nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(scene.first_light)
+    for number, ball in enumerate(scene.balls, start=scene.first_sphere):
+        if number >= scene.first_light:
+            met, t = meet_sphere(ray, ball)
+            closer = met & (t <= nearest)
+            nearest = dr.select(closer, t, nearest)
+            primitive = dr.select(closer, number, primitive)
+    nearest, primitive = _or_light_triangle(scene, ray, active, nearest, primitive)
+    seen = active & (nearest < dr.inf)
+    seen &= ~occluded(scene, ray, nearest, primitive - scene.first_light, seen)
+    return _surface(scene, features, ray, nearest, primitive, seen)
+
+
+def _or_light_triangle(
+    scene: DeviceScene, ray: Ray, active: Bool, nearest: Float, primitive: UInt32
+) -> tuple[Float, UInt32]:
+    """The distance and number of a light's triangle that is nearer than what has been found."""
     for number, met, t, front in _light_triangles(scene, ray, active):
         slack = _slack(ray, t)
         closer = met & (t + dr.select(front, -slack, slack) < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
-    return _surface(scene, features, ray, nearest, primitive, active & (nearest < dr.inf))
+    return nearest, primitive
 
 
 def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, active: Bool) -> Bool:

@@ -10,7 +10,7 @@ and with k bounces the radiance along the first ray is estimated by
     implicit    Σ_{i ≤ k+1}  beta_i L_e(x_i)
     explicit    L_e(x₁) + Σ_{i ≤ k}  beta_i f(x_i, ω') cos θ' L_e(ω') V(ω') / p_light(ω')
     mis         L_e(x₁) + both sums from there on, each term weighted by the power heuristic,
-    guided      as mis, or as explicit where that has next to no noise, with guided directions,
+    guided      as mis, or as explicit where that has little noise, with guided directions,
 
 where ω' leads from x_i to a sampled point of a light, and V tells whether nothing stands between
 (Kajiya 1986; Veach 1997, ch. 8–10).
@@ -26,7 +26,7 @@ import drjit as dr
 from drpt.kernel.brdf import Brdf, make_brdf
 from drpt.kernel.camera import Ray
 from drpt.kernel.guide import GUIDED, NOWHERE
-from drpt.kernel.intersect import Hit, closest_hit, occluded
+from drpt.kernel.intersect import Hit, closest_hit, light_hit, occluded
 from drpt.kernel.light import (
     LightSample,
     Receiver,
@@ -119,18 +119,20 @@ class Tracer:
         if self.vertices <= 1:
             return first.path.radiance, first.path.rays
         path = self.leave(first, sampler, 0)
-        unrolled = min(self.vertices, UNROLLED_VERTICES)
+        unrolled = min(self.bounces, UNROLLED_VERTICES)
         for depth in range(1, unrolled):
             path = self.step(path, sampler, depth)
-        if unrolled < self.vertices:
+        if unrolled < self.bounces:
             path = self._loop(path, sampler, unrolled)
+        if self.counts_hits:
+            path = self.step(path, sampler, self.bounces)
         return path.radiance, path.rays
 
     def _loop(self, path: Path, sampler: Sampler, first: int) -> Path:
-        """Follow the paths that go on, from vertex number ``first``."""
+        """Follow the paths that go on, from vertex number ``first``, while they may reflect."""
 
         def goes_on(depth: UInt32, *path: Any) -> Bool:
-            return Path(*path).active
+            return Path(*path).active & (depth < self.bounces)
 
         def step(depth: UInt32, *path: Any) -> tuple[Any, ...]:
             return depth + 1, *self.step(Path(*path), sampler, depth)
@@ -162,7 +164,9 @@ class Tracer:
         ray = Ray(path.origin, path.direction)
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
         is_first: Any = depth == 0
-        hit = closest_hit(scene, features, ray, path.active)
+        reflects: Any = depth < self.bounces
+        find = light_hit if reflects is False and is_first is False else closest_hit
+        hit = find(scene, features, ray, path.active)
         patch = path.patch
         if self.guide is not None:
             patch = self.guide.patch_of(hit)
@@ -173,11 +177,12 @@ class Tracer:
             weighted = features.mis and is_first is not True
             emitted = self._emission(path, hit, counts, weighted=weighted)
             radiance = radiance + path.beta * emitted
-        reflects = hit.primitive < scene.first_light
-        hit = hit._replace(valid=hit.valid & reflects & (depth < self.bounces))
+        hit = hit._replace(valid=hit.valid & (hit.primitive < scene.first_light) & reflects)
         brdf = make_brdf(scene, features, hit, -ray.direction)
-        vertex = Vertex(path, hit, brdf, dr.select(brdf.is_diffuse, patch, 0))
-        if features.direct_light and not (isinstance(depth, int) and depth == self.bounces):
+        # After the last bounce there is but light, which a guide knows nothing of.
+        guided = brdf.is_diffuse & (depth + 1 < self.bounces)
+        vertex = Vertex(path, hit, brdf, dr.select(guided, patch, 0))
+        if features.direct_light and reflects is not False:
             light, traced = self._direct(vertex, sampler, depth)
             radiance = radiance + path.beta * light
             rays = rays + dr.select(traced, 1, 0)

@@ -104,7 +104,7 @@ class _Recorder:
         )
         vertices = Vertices(
             reached=np.array(path.active),
-            throughput=_rows(path.beta),
+            throughput=_rows(vertex.path.beta),
             direction=_rows(path.direction),
             shape=self._shapes(hit.primitive, hit.valid),
             point=self.primitives.origin + _rows(hit.point),
