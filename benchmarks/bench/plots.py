@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 COLUMNS = 4
 PANEL = 3.1
 """Inches."""
-COLOURS = dict(zip(Mode, ("0.75", "#8d6bb8", "#5fb3a1", "#2166ac", "#08a045"), strict=True))
+COLOURS = dict(
+    zip(Mode, ("0.75", "#8d6bb8", "#5fb3a1", "#2166ac", "#08a045", "#d95f02"), strict=True)
+)
 MITSUBA_COLOUR, ORACLE_COLOUR = "#d6604d", "0.2"
 
 
