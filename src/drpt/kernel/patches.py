@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 PATCHES = 256
 """About so many patches have the size of all facets together; a small facet is one of its own."""
 COLUMNS = 8
-"""A facet has so many columns of patches at the most, along its longest edge; numbers of patches
-go on at a multiple of it in the next row."""
+"""A facet has so many columns of patches at the most, along its longest edge.
+
+The numbers of the patches of a row follow each other; those of the next row begin so much later.
+"""
 ROWS = 16
 """A facet has so many rows of patches at the most."""
 MOST_ROWS = 96
@@ -75,21 +77,8 @@ class _Grid(NamedTuple):
 
 def make_patches(facets: Sequence[Facet]) -> Patches:
     """Cut facets into patches of about the same size."""
-    frames = [_axes(facet) for facet in facets]
-    extents = np.array(
-        [np.ptp(f.corners @ a.T, axis=0) for f, a in zip(facets, frames, strict=True)]
-    )
-    size = np.sqrt(extents.prod(axis=1).sum() / PATCHES)
-    while (counts := _cells(extents, size))[:, 1].sum() > max(MOST_ROWS, len(facets)):
-        size *= np.sqrt(2)
-    first = 1 + np.cumsum(counts[:, 1]) - counts[:, 1]
-    grids = [
-        _grid(facet.corners, axes, *numbers)
-        for facet, axes, numbers in zip(
-            facets, frames, np.column_stack([counts, first]).tolist(), strict=True
-        )
-    ]
-    total = COLUMNS * (1 + counts[:, 1].sum())
+    grids = _make_grids([facet.corners for facet in facets], [_axes(facet) for facet in facets])
+    total = COLUMNS * (grids[-1].first + grids[-1].rows)
     of_facet, (corner, right, up) = np.full(total, -1), np.zeros((3, total, 3))
     for facet, grid in enumerate(grids):
         row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
@@ -97,6 +86,17 @@ def make_patches(facets: Sequence[Facet]) -> Patches:
         of_facet[numbers], right[numbers], up[numbers] = facet, grid.right, grid.up
         corner[numbers] = grid.corner + column[:, None] * grid.right + row[:, None] * grid.up
     return Patches(of_facet, corner, right, up, np.array([grid.frame() for grid in grids]))
+
+
+def _make_grids(outlines: list[Array], axes: list[Array]) -> list[_Grid]:
+    """Grids of about the same cells, the rows of which follow those of the grid before."""
+    extents = np.array([np.ptp(o @ a.T, axis=0) for o, a in zip(outlines, axes, strict=True)])
+    size = np.sqrt(extents.prod(axis=1).sum() / PATCHES)
+    while (counts := _cells(extents, size))[:, 1].sum() > max(MOST_ROWS, len(outlines)):
+        size *= np.sqrt(2)
+    ends = 1 + np.cumsum(counts[:, 1])
+    numbers = np.column_stack([counts, ends - counts[:, 1]]).tolist()
+    return [_grid(o, a, *n) for o, a, n in zip(outlines, axes, numbers, strict=True)]
 
 
 def _cells(extents: Array, size: float) -> NDArray[np.intp]:

@@ -158,27 +158,18 @@ class Tracer:
         is_last = isinstance(depth, int) and depth == self.vertices - 1
         return vertex.path if is_last else self.leave(vertex, sampler, depth)
 
-    def arrive(self, path: Path, sampler: Sampler, depth: int | UInt32) -> Vertex:
+    def arrive(self, path: Path, sampler: Sampler, depth: Any) -> Vertex:
         """Find the next vertex, and collect the light that it sends."""
-        scene, features = self.scene, self.features
-        ray = Ray(path.origin, path.direction)
+        features, is_first, reflects = self.features, depth == 0, depth < self.bounces
+        path, hit, patch = self._meet(path, depth)
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
-        is_first: Any = depth == 0
-        reflects: Any = depth < self.bounces
-        find = light_hit if reflects is False and is_first is False else closest_hit
-        hit = find(scene, features, ray, path.active)
-        patch = path.patch
-        if self.guide is not None:
-            patch = self.guide.patch_of(hit)
-            if is_first is not True:
-                path, hit = self._arrive_guided(path, hit, patch, self.guide)
         if self.counts_hits or is_first is not False:
             counts = True if self.counts_hits else is_first
             weighted = features.mis and is_first is not True
             emitted = self._emission(path, hit, counts, weighted=weighted)
             radiance = radiance + path.beta * emitted
-        hit = hit._replace(valid=hit.valid & (hit.primitive < scene.first_light) & reflects)
-        brdf = make_brdf(scene, features, hit, -ray.direction)
+        hit = hit._replace(valid=hit.valid & (hit.primitive < self.scene.first_light) & reflects)
+        brdf = make_brdf(self.scene, features, hit, -path.direction)
         # After the last bounce there is but light, which a guide knows nothing of.
         guided = brdf.is_diffuse & (depth + 1 < self.bounces)
         vertex = Vertex(path, hit, brdf, dr.select(guided, patch, 0))
@@ -188,7 +179,20 @@ class Tracer:
             rays = rays + dr.select(traced, 1, 0)
         return vertex._replace(path=path._replace(radiance=radiance, rays=rays))
 
-    def _arrive_guided(self, path: Path, hit: Hit, patch: UInt32, guide: Guide) -> tuple[Path, Hit]:
+    def _meet(self, path: Path, depth: Any) -> tuple[Path, Hit, UInt32]:
+        """The paths that arrive where their rays meet something, what that is, and its patch."""
+        is_first, reflects = depth == 0, depth < self.bounces
+        find = light_hit if reflects is False and is_first is False else closest_hit
+        ray = Ray(path.origin, path.direction)
+        hit = find(self.scene, self.features, ray, path.active)
+        if self.guide is None:
+            return path, hit, path.patch
+        patch = self.guide.patch_of(hit)
+        if is_first is True:
+            return path, hit, patch
+        return *self._weigh(path, hit, patch, self.guide), patch
+
+    def _weigh(self, path: Path, hit: Hit, patch: UInt32, guide: Guide) -> tuple[Path, Hit]:
         """Weigh both ways to choose a direction; what has missed its aim is lost."""
         lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
         density = guide.density(path.patch, patch)
@@ -223,14 +227,18 @@ class Tracer:
         if not self.mode.samples_brdf:
             direction = square_to_sphere(u)
             return Turn(direction, brdf.eval(direction) / sphere_pdf(), vertex.path.pdf, nowhere)
-        if self.guide is None:
-            sample = brdf.sample(u)
-            pdf = sample.pdf if self.features.mis else vertex.path.pdf
-            return Turn(sample.direction, sample.weight, pdf, nowhere)
-        guided = (vertex.patch > 0) & (u.x < GUIDED)
+        if self.guide is not None:
+            return self._guided_turn(vertex, u, self.guide)
+        sample = brdf.sample(u)
+        pdf = sample.pdf if self.features.mis else vertex.path.pdf
+        return Turn(sample.direction, sample.weight, pdf, nowhere)
+
+    def _guided_turn(self, vertex: Vertex, u: Array2f, guide: Guide) -> Turn:
+        """A direction to a point of a patch, or by the BRDF."""
+        brdf, guided = vertex.brdf, (vertex.patch > 0) & (u.x < GUIDED)
         share = self._unguided(vertex)
         u = vec2(dr.select(guided, u.x / GUIDED, (u.x - (1 - share)) / share), u.y)
-        aimed, facet = self.guide.aim(vertex.patch, vertex.hit.point, u, guided)
+        aimed, facet = guide.aim(vertex.patch, vertex.hit.point, u, guided)
         sample = brdf.sample(u)
         direction = dr.select(guided, aimed, sample.direction)
         of_aimed = cosine_hemisphere_pdf(dr.dot(brdf.shading_normal, aimed))
