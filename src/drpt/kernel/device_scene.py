@@ -108,9 +108,9 @@ class DeviceScene:
 
     def light_geometry_row(self, light: UInt32) -> Array4f:
         """The same of a light."""
-        return (
-            self.only_light[0] if self.only_light else self.geometry_row(self.first_light + light)
-        )
+        if self.only_light:
+            return self.only_light[0]
+        return self.geometry_row(self.first_light + light)
 
     def light_row(self, light: UInt32) -> Array4f:
         """Radiance and area of a light."""

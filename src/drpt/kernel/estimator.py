@@ -67,7 +67,8 @@ class Features:
     diffuse, phong
         Reflection of that kind.
     emission
-        Radiance of lights that paths run into; in the explicit modes camera rays alone do.
+        Radiance of lights that paths run into; without ``mis``, in modes that sample lights, camera
+        rays alone do.
     direct_light, light_choice
         Samples of lights at every vertex, and the choice among several.
     sphere_light_samples, triangle_light_samples
@@ -167,7 +168,7 @@ def _light_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, 
         "light_choice": _decide(choice, *sampling, (lights > 1, "there is one light")),
         "sphere_light_samples": _some(spheres, "sphere light", *sampling),
         "triangle_light_samples": _some(lights - spheres, "triangle light", *sampling),
-        "mis": _decide(both, *sampling, _counts_hits(primitives, mode)),
+        "mis": _decide(both, *sampling, _hits_count(primitives, mode)),
         "guiding": _decide(
             f"mode {mode} goes where patches reflect much light",
             *sampling,
@@ -248,7 +249,7 @@ def _ray_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fa
         "last_ray": _decide(
             f"mode {mode} counts the light that it runs into",
             *_reflecting(primitives, bounces),
-            _counts_hits(primitives, mode),
+            _hits_count(primitives, mode),
         ),
     }
 
@@ -272,8 +273,8 @@ def _sampling(primitives: Primitives, bounces: int, mode: Mode) -> tuple[Need, .
     )
 
 
-def _counts_hits(primitives: Primitives, mode: Mode) -> Need:
-    """Whether a path that runs into a light after a bounce collects its radiance."""
+def _hits_count(primitives: Primitives, mode: Mode) -> Need:
+    """What makes a path that runs into a light after a bounce collect its radiance."""
     if mode is Mode.GUIDED:
         sphere = len(primitives.radiance) == primitives.sphere_lights == 1
         otherwise = "light samples of one sphere have all of its light on diffuse surfaces"

@@ -13,13 +13,13 @@ are those of radiosity.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 import numpy as np
 
 from drpt.kernel.patches import COLUMNS
-from drpt.kernel.vec import vec3
+from drpt.kernel.vec import vec2, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,9 +38,41 @@ GUIDED = 0.5
 SLOTS = 1024
 """A patch's chance to be chosen is a multiple of 1 / this, so that it is exact."""
 NOWHERE = 0xFFFFFFFF
-"""Number of no facet."""
+"""Number of no facet; that of no patch is 0."""
 _BITS = 10
 _MASK = 2**_BITS - 1
+
+
+class Spot(NamedTuple):
+    """A point of a patch, the facet that has it, and the patch's area."""
+
+    point: Array3f
+    facet: UInt32
+    area: Float
+
+
+class DevicePatches:
+    """Patches as kernels see them, to find points of them.
+
+    ``upload`` brings numbers to the device, to memory from which rows are gathered in one piece.
+    """
+
+    def __init__(
+        self, patches: Patches, types: ModuleType, upload: Callable[[Array], Float]
+    ) -> None:
+        self._types = types
+        corner = np.column_stack([patches.corner, patches.facet])
+        right = np.column_stack([patches.right, patches.area])
+        up = np.pad(patches.up, ((0, 0), (0, 1)))
+        self._rows = upload(np.concatenate([corner, right, up], axis=1))
+
+    def spot(self, patch: UInt32, u: Array2f, active: Any = True) -> Spot:
+        """Area: a point of a patch, uniform."""
+        types = self._types
+        rows = (dr.gather(types.Array4f, self._rows, 3 * patch + k, active) for k in range(3))
+        corner, right, up = rows
+        point = [dr.fma(right[k], u.x, dr.fma(up[k], u.y, corner[k])) for k in range(3)]
+        return Spot(vec3(*point), types.UInt32(corner[3]), right[3])
 
 
 class Guide:
@@ -66,9 +98,7 @@ class Guide:
         self._density = upload(counts / SLOTS / area)
         self._slots = types.UInt32(_slots(counts).ravel())
         self._frames = upload(patches.frames)
-        corner = np.column_stack([patches.corner, patches.facet])
-        right, up = (np.pad(edges, ((0, 0), (0, 1))) for edges in (patches.right, patches.up))
-        self._rows = upload(np.concatenate([corner, right, up], axis=1))
+        self._goals = DevicePatches(patches, types, upload)
 
     def patch_of(self, hit: Hit) -> UInt32:
         """The patch of a hit; 0 where that is not on a facet."""
@@ -92,10 +122,8 @@ class Guide:
         word = dr.gather(types.UInt32, self._slots, patch * SLOTS + types.UInt32(x), active)
         goal, start, more = word & _MASK, (word >> _BITS) & _MASK, word >> (2 * _BITS)
         within = (x - types.Float32(start)) / (types.Float32(more) + 1)
-        rows = (dr.gather(types.Array4f, self._rows, 3 * goal + k, active) for k in range(3))
-        a, right, up = rows
-        way = [dr.fma(right[k], within, dr.fma(up[k], u.y, a[k])) - point[k] for k in range(3)]
-        return dr.normalize(vec3(*way)), types.UInt32(a[3])
+        spot = self._goals.spot(goal, vec2(within, u.y), active)
+        return dr.normalize(spot.point - point), spot.facet
 
     def density(self, patch: UInt32, goal: UInt32) -> Float:
         """Area: the density of the points that :meth:`aim` finds on another patch."""

@@ -126,9 +126,8 @@ class Launcher:
         if not self.tracer.features.emission:
             return Sums(np.zeros((lanes, work.pixels, 3)), 0, 0)
         totals = self._trace(self._lanes(work, lanes))
-        radiance: Any = dr.ravel(
-            totals.radiance
-        )  # by the kernel that makes it: a copy takes as long
+        # One array, rows of three, by the kernel that makes it.
+        radiance: Any = dr.ravel(totals.radiance)
         with flush_denormals():
             dr.eval(radiance, totals.rays, totals.non_finite)
             dr.sync_thread()

@@ -7,6 +7,7 @@ the receiver its share of the form factor.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from drpt.kernel.camera import Ray
 from drpt.kernel.denormals import flush_denormals
 from drpt.kernel.device_scene import to_device
 from drpt.kernel.estimator import Features, Mode
-from drpt.kernel.guide import Guide
+from drpt.kernel.guide import DevicePatches, Guide
 from drpt.kernel.intersect import SPAWN_OFFSET
 from drpt.kernel.patches import make_patches
 from drpt.kernel.path import Tracer
@@ -31,8 +32,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.device_scene import DeviceScene
+    from drpt.kernel.guide import Spot
     from drpt.kernel.patches import Patches
     from drpt.kernel.primitives import Primitives
+    from drpt.kernel.sampler import Sampler
 
 RAYS = 16
 """Rays between two patches."""
@@ -55,7 +58,8 @@ def _exchange(primitives: Primitives, scene: DeviceScene, patches: Patches) -> N
     mode = Mode.EXPLICIT if primitives.diffuse.all() else Mode.MIS
     tracer = Tracer(scene, Features.of(primitives, 1, mode), mode, 1)
     there = np.flatnonzero(patches.facet >= 0)
-    exchange = _Exchange(tracer, patches, there)
+    on_device = DevicePatches(patches, scene.types, partial(to_device, types=scene.types))
+    exchange = _Exchange(tracer, on_device, scene.types.UInt32(there.astype(np.uint32)))
     mean = exchange.light(dr.arange(scene.types.UInt32, len(there) ** 2))
     with flush_denormals():
         dr.eval(mean)
@@ -65,60 +69,51 @@ def _exchange(primitives: Primitives, scene: DeviceScene, patches: Patches) -> N
     return light
 
 
+@dataclass
 class _Exchange:
-    """Rays from patches to patches."""
+    """Rays from patches to patches, which have the numbers ``there``."""
 
-    def __init__(self, tracer: Tracer, patches: Patches, there: NDArray[np.intp]) -> None:
-        self._tracer, self._types, self._count = tracer, tracer.scene.types, len(there)
-        corner = np.column_stack([patches.corner, patches.facet])
-        right = np.pad(patches.right, ((0, 0), (0, 1)))
-        up = np.column_stack([patches.up, patches.area])
-        self._rows = to_device(np.concatenate([corner, right, up], axis=1)[there], self._types)
+    tracer: Tracer
+    patches: DevicePatches
+    there: UInt32
 
     def light(self, pair: UInt32) -> Float:
         """Mean of what the rays of each pair bring; a pair has the number to + n from."""
-        types = self._types
-        receiver = pair // self._count
-        sender = pair - receiver * self._count
+        types, count = self.tracer.scene.types, len(self.there)
+        number = pair // count
+        receiver = dr.gather(types.UInt32, self.there, number)
+        sender = dr.gather(types.UInt32, self.there, pair - number * count)
 
         def trace(ray: UInt32, total: Float) -> tuple[UInt32, Float]:
-            return ray + 1, total + self._ray(pair, receiver, sender, ray)
+            here, other = (
+                SobolSampler(pair, ray, dr.opaque(types.UInt32, SEED + k)) for k in range(2)
+            )
+            to = self.patches.spot(receiver, here.next_2d(0))
+            origin = self.patches.spot(sender, other.next_2d(0))
+            return ray + 1, total + self._sent(origin, to, here)
 
         end = dr.opaque(types.UInt32, RAYS)
         state: tuple[Any, ...] = (types.UInt32(0), dr.zeros(types.Float32, len(pair)))
         goes_on: Callable[..., Any] = lambda ray, _: ray < end  # noqa: E731
         return dr.while_loop(state, goes_on, trace)[1] / RAYS
 
-    def _ray(self, pair: UInt32, receiver: UInt32, sender: UInt32, ray: UInt32) -> Float:
-        """What one ray brings."""
-        tracer, types = self._tracer, self._types
-        seeds = (dr.opaque(types.UInt32, SEED + k) for k in range(2))
-        here, there = (SobolSampler(pair, ray, seed) for seed in seeds)
-        to, normal_to, _, _ = self._point(receiver, here)
-        origin, normal, area, facet = self._point(sender, there)
-        way = origin - to
+    def _sent(self, origin: Spot, to: Spot, sampler: Sampler) -> Float:
+        """What a ray brings from one spot to another, along which it is followed back."""
+        way = origin.point - to.point
         squared = dr.squared_norm(way)
         direction = way * dr.rsqrt(squared)
-        cosine_to, cosine = (dr.dot(n, direction) for n in (normal_to, normal))
-        off = dr.select(cosine_to > 0, normal_to, -normal_to) * (4 * SPAWN_OFFSET * largest(to))
-        path = tracer.start(Ray(to + off, direction))
-        faces = dr.abs(cosine_to * cosine) > 0
-        vertex = tracer.arrive(path._replace(active=faces), here, 0)
-        seen = faces & vertex.hit.valid & (vertex.hit.primitive == facet)
-        radiance, _ = tracer.follow(vertex, here)
-        form = dr.abs(cosine_to * cosine) * area / dr.maximum(squared, NEAR**2 * area)
+        normal = self._normal(to)
+        cosine = dr.dot(normal, direction)
+        cosines = dr.abs(cosine * dr.dot(self._normal(origin), direction))
+        off = dr.select(cosine > 0, normal, -normal) * (4 * SPAWN_OFFSET * largest(to.point))
+        path = self.tracer.start(Ray(to.point + off, direction))
+        vertex = self.tracer.arrive(path._replace(active=cosines > 0), sampler, 0)
+        seen = vertex.hit.valid & (vertex.hit.primitive == origin.facet)
+        radiance, _ = self.tracer.follow(vertex, sampler)
+        form = cosines * origin.area / dr.maximum(squared, NEAR**2 * origin.area)
         light = (radiance.x + radiance.y + radiance.z) * form
         return dr.select(seen & dr.isfinite(light), light, 0)
 
-    def _point(
-        self, patch: UInt32, sampler: SobolSampler
-    ) -> tuple[Array3f, Array3f, Float, UInt32]:
-        """A point of a patch, the normal there, the patch's area, and its facet."""
-        types = self._types
-        u = sampler.next_2d(0)
-        a, b, c = (dr.gather(types.Array4f, self._rows, 3 * patch + k) for k in range(3))
-        corner, right, up = (vec3(r[0], r[1], r[2]) for r in (a, b, c))
-        facet = types.UInt32(a[3])
-        row = self._tracer.scene.geometry_row(facet)
-        point = dr.fma(right, u.x, dr.fma(up, u.y, corner))
-        return point, vec3(row[0], row[1], row[2]), c[3], facet
+    def _normal(self, spot: Spot) -> Array3f:
+        row = self.tracer.scene.geometry_row(spot.facet)
+        return vec3(row[0], row[1], row[2])

@@ -59,7 +59,7 @@ class Path(NamedTuple):
     active: Bool  # whether there is a next vertex
     beta: Array3f  # throughput up to it
     normal: Array3f  # shading normal where the ray starts, for MIS
-    pdf: Float  # density of the direction by the BRDF, for MIS and path guiding
+    pdf: Float  # density by which the BRDF's share of the directions leads there
     patch: UInt32  # of the guide, where the ray starts; 0 where nothing is guided
     aim: UInt32  # facet to which the guide aimed it
     radiance: Array3f  # collected so far
@@ -76,7 +76,11 @@ class Vertex(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """Where a path goes on: ``weight`` is f cos θ / p, as far as p is known before it arrives."""
+    """Where a path goes on.
+
+    ``weight`` is f cos θ over ``pdf``, the density of the BRDF's share of the directions; that of
+    the guided ones is known when the path arrives.
+    """
 
     direction: Array3f
     weight: Array3f
@@ -172,7 +176,7 @@ class Tracer:
         brdf = make_brdf(self.scene, features, hit, -path.direction)
         # After the last bounce there is but light, which a guide knows nothing of.
         guided = brdf.is_diffuse & (depth + 1 < self.bounces)
-        vertex = Vertex(path, hit, brdf, dr.select(guided, patch, 0))
+        vertex = Vertex(path, hit, brdf, dr.select(guided, patch, type(patch)(0)))
         if features.direct_light and reflects is not False:
             light, traced = self._direct(vertex, sampler, depth)
             radiance = radiance + path.beta * light
@@ -195,11 +199,10 @@ class Tracer:
     def _weigh(self, path: Path, hit: Hit, patch: UInt32, guide: Guide) -> tuple[Path, Hit]:
         """Weigh both ways to choose a direction; what has missed its aim is lost."""
         lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
-        density = guide.density(path.patch, patch)
-        guided = GUIDED * density * dr.square(hit.distance)
-        cosine = dr.abs(dr.dot(hit.normal, path.direction))
-        share = dr.select(density > 0, path.pdf * cosine / (path.pdf * cosine + guided), 1)
-        beta = path.beta * dr.select(lost, 0, share)
+        by_guide = GUIDED * guide.density(path.patch, patch) * dr.square(hit.distance)
+        by_brdf = path.pdf * dr.abs(dr.dot(hit.normal, path.direction))
+        weight = dr.select(by_guide > 0, by_brdf / (by_brdf + by_guide), 1)
+        beta = path.beta * dr.select(lost, 0, weight)
         return path._replace(beta=beta), hit._replace(valid=hit.valid & ~lost)
 
     def leave(self, vertex: Vertex, sampler: Sampler, depth: int | UInt32) -> Path:
