@@ -19,6 +19,7 @@ of four independent replicates has 1.5 to 2 times the relMSE in the Cornell boxe
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +35,8 @@ INDEPENDENT, SMOOTH = 2.0, 8.0
 """Least and greatest ρ."""  # noqa: RUF001
 PRIOR = 64
 """Pixels' worth of belief in independent samples, which decides in the smallest pictures."""
+AT_ONCE = 2**14
+"""Pixels whose blocks and their differences stay in the cache: new memory takes longest."""
 TINY = np.finfo(np.float64).tiny
 WINDOW = 5
 """Pixels along the sides of the squares in which variances are averaged: one has too few blocks."""
@@ -53,12 +56,22 @@ def squared_differences(blocks: NDArray[np.float32], size: int) -> NDArray[np.fl
     Of the sums of four runs of ``size`` samples, (4, …), those of the halves of all, then the means
     of those of the halves of halves, (2, …). Of two runs the first, (1, …); of fewer none, (0, …).
     """
+    levels = np.empty((len(blocks) // 2, *blocks.shape[1:]), np.float32)
     with np.errstate(invalid="ignore", over="ignore"):  # such errors are not a number, or infinite
-        if len(blocks) < 4:
-            return np.asarray(np.square((blocks[0:1] - blocks[1:2]) * np.float32(0.5 / size)))
-        a, b, c, d = blocks * np.float32(0.25 / size)
-        fine = 2 * (np.square(a - b) + np.square(c - d))
-        return np.stack([np.square(a + b - c - d), fine])
+        for start in range(0, levels.shape[1], AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            for level, squares in zip(
+                levels[:, part], _squares(blocks[:, part], size), strict=True
+            ):
+                level[:] = squares
+    return levels
+
+
+def _squares(blocks: NDArray[np.float32], size: int) -> list[NDArray[np.float32]]:
+    if len(blocks) < 4:
+        return [np.square((a - b) * np.float32(0.5 / size)) for a, b in pairwise(blocks)]
+    a, b, c, d = blocks * np.float32(0.25 / size)
+    return [np.square(a + b - c - d), 2 * (np.square(a - b) + np.square(c - d))]
 
 
 def estimate(

@@ -112,6 +112,7 @@ class _Exchange:
         radiance, _ = self.tracer.follow(vertex, sampler)
         form = cosines * origin.area / dr.maximum(squared, NEAR**2 * origin.area)
         light = (radiance.x + radiance.y + radiance.z) * form
+        # What is not finite tells nothing here; the samples of a render that are not are counted.
         return dr.select(seen & dr.isfinite(light), light, 0)
 
     def _normal(self, spot: Spot) -> Array3f:

@@ -185,10 +185,11 @@ class Tracer:
 
     def _meet(self, path: Path, depth: Any) -> tuple[Path, Hit, UInt32]:
         """The paths that arrive where their rays meet something, what that is, and its patch."""
-        is_first, reflects = depth == 0, depth < self.bounces
-        find = light_hit if reflects is False and is_first is False else closest_hit
-        ray = Ray(path.origin, path.direction)
-        hit = find(self.scene, self.features, ray, path.active)
+        is_first, ray = depth == 0, Ray(path.origin, path.direction)
+        is_end = depth == self.bounces
+        if is_end is True and is_first is False:  # that ray was not guided
+            return path, light_hit(self.scene, self.features, ray, path.active), path.patch
+        hit = closest_hit(self.scene, self.features, ray, path.active)
         if self.guide is None:
             return path, hit, path.patch
         patch = self.guide.patch_of(hit)
