@@ -110,13 +110,13 @@ def run(work: Callable[[], Result]) -> Run:
 def undone(skip: Skip) -> Iterator[None]:
     """Kernels have what they could do without."""
     backend.load()
-    from drpt.kernel.launch import prepare
+    from drpt.kernel.launch import forget
 
     with ExitStack() as stack:
-        stack.callback(prepare.cache_clear)
+        stack.callback(forget)
         for change in skip.undo():
             stack.enter_context(change)
-        prepare.cache_clear()
+        forget()
         yield
 
 
@@ -179,8 +179,8 @@ def _light_code() -> list[AbstractContextManager[Any]]:
     """Of the first vertex only the device knows that light does not leave it."""
     from drpt.kernel.path import Tracer
 
-    def first_vertex(self: Tracer, ray: Any, sampler: Any) -> Vertex:
-        return self.arrive(self.start(ray), sampler, _opaque(self.scene.types.UInt32, 0))
+    def first_vertex(self: Tracer, ray: Any, sampler: Any, known: Any = None) -> Vertex:
+        return self.arrive(self.start(ray), sampler, _opaque(self.scene.types.UInt32, 0), known)
 
     flags = {"diffuse": True, "direct_light": True, "sphere_light_samples": True}
     return [*features(**flags)(), patch.object(Tracer, "first_vertex", first_vertex)]
@@ -351,9 +351,12 @@ SKIPS = (
     Skip("spheres one by one", many_spheres, 2, _EXPLICIT, _one_by_one),
     Skip("shadow rays below the horizon", many_spheres, 2, _EXPLICIT, _shadow_rays),
     Skip("lanes that wait", spheres, 8, _EXPLICIT, features(regeneration=False)),
+    Skip(
+        "camera rays of covered pixels", cornell_box, 2, _EXPLICIT, features(covered_pixels=False)
+    ),
     Skip("a camera ray for each path", cornell_box, 2, _EXPLICIT, features(shared_rays=False)),
 )
-"""The last one is skipped at the price of more operations, which fewer rays are worth."""
+"""The last two are skipped at the price of more operations, which fewer rays are worth."""
 
 
 if __name__ == "__main__":

@@ -16,10 +16,9 @@ TYPES = backend.load()
 @pytest.fixture(autouse=True)
 def _forget_shapes() -> None:
     """Let no test see shapes that another one has prepared with other constants."""
-    from drpt.kernel.launch import learned, prepare
+    from drpt.kernel.launch import forget
 
-    prepare.cache_clear()
-    learned.cache_clear()
+    forget()
 
 
 def to_device(values: npt.ArrayLike) -> Any:

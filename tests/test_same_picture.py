@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.launch import prepare
+from drpt.kernel.launch import forget
 from tests.measuring import with_radiance
 from tests.test_modes import small_scene
 
@@ -84,7 +84,7 @@ def test_triangles_in_embree_and_unrolled(mode: str, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("drpt.kernel.primitives.FACET_LIMIT", 0)
     monkeypatch.setattr("drpt.kernel.primitives.LIGHT_FACET_LIMIT", 0)
     monkeypatch.setattr("drpt.kernel.device_scene.SPHERE_LIMIT", 0)
-    prepare.cache_clear()
+    forget()
     assert_same(drpt.render(small_scene(), SPP, BOUNCES, mode), plain)
 
 

@@ -40,11 +40,11 @@ if TYPE_CHECKING:
 SIDE, SPP = 32, 8
 # Such points are off by 1e-7 of the scene, which grows from bounce to bounce.
 ROUNDING = 2e-4
-ROUNDED = {"bodies as facets", "facets as triangles"}
+ROUNDED = {"bodies as facets", "facets as triangles", "camera rays of covered pixels"}
 # Paths that share camera rays are other samples: `test_launch` compares their means.
 OTHER_SAMPLES = {"a camera ray for each path"}
-# The same operations, on fewer lanes.
-AS_MANY = {"shadow rays below the horizon"}
+# As many operations or fewer, for more lanes.
+AS_MANY = {"shadow rays below the horizon", "camera rays of covered pixels"}
 QUICK = {
     "Phong code",
     "interpolated normals",
@@ -53,6 +53,7 @@ QUICK = {
     "last ray",
     "shadows of the walls",
     "bodies as facets",
+    "camera rays of covered pixels",
 }
 
 

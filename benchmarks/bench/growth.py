@@ -14,7 +14,7 @@ from benchmarks.bench.timing import alternate, median_seconds, start
 from drpt import Mode, Scene, load_scene
 from drpt.crosscheck import measure
 from drpt.kernel import device_scene, light_tree
-from drpt.kernel.launch import prepare
+from drpt.kernel.launch import forget
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,10 +63,10 @@ def uniform_choice() -> Iterator[None]:
         made.append(kept(*arguments))
         return made[-1]
 
-    prepare.cache_clear()
+    forget()
     with patch.object(light_tree, "EVEN", ALIKE), patch.object(device_scene, "LightTree", even):
         yield
-    prepare.cache_clear()
+    forget()
     if not made:
         raise RuntimeError("lights are chosen by something else than a LightTree")
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from drpt.kernel.brdf import Brdf, make_brdf
+from drpt.kernel.brdf import Brdf
 from drpt.kernel.device_scene import upload
 from drpt.kernel.estimator import Features
-from drpt.kernel.intersect import Hit
 from drpt.kernel.primitives import DIFFUSE, make_primitives
 from drpt.kernel.sampler import SobolSampler
 from drpt.scene import Camera, Diffuse, Material, Phong, Scene, Sphere
@@ -277,16 +276,15 @@ def test_black_reflects_nothing(material: Material) -> None:
     assert (to_host(case.device.eval(wi)) == 0).all()
 
 
-def test_make_brdf_takes_the_material_of_the_primitive_that_is_hit() -> None:
+def test_a_row_has_the_material_of_its_primitive() -> None:
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), fov=40, width=4, height=4)
     materials: list[Material] = [Diffuse((0.1, 0.2, 0.3)), Phong((0.4, 0.5, 0.6), 7)]
     shapes = [Sphere((x, 0, 0), 0.4, material=m) for x, m in enumerate(materials)]
-    scene = upload(
-        make_primitives(Scene(camera, [*shapes, Sphere((0, 9, 0), 1, radiance=1)]).shapes), TYPES
-    )
-    n, distance, yes = to_device([[0, 0, 1]] * 3), to_device([1, 1, 1]), TYPES.Bool([True] * 3)
-    hit = Hit(TYPES.Bool([True, True, False]), distance, TYPES.UInt32([0, 1, 0]), n, n, n, yes)
-    brdf = make_brdf(scene, features(*materials), hit, n)
-    albedo = np.array([materials[0].albedo, materials[1].albedo, (0, 0, 0)])
-    np.testing.assert_allclose(to_host(brdf.albedo), albedo, rtol=1e-7)
-    np.testing.assert_array_equal(to_host(brdf.exponent)[:2], [DIFFUSE, 7])
+    lamp = Sphere((0, 9, 0), 1, radiance=1)
+    scene = upload(make_primitives(Scene(camera, [*shapes, lamp]).shapes), TYPES)
+    active = TYPES.Bool([True, True, True, False])
+    row = scene.surface_row(TYPES.UInt32([0, 1, 2, 0]), active)
+    albedo = np.array([materials[0].albedo, materials[1].albedo, (0, 0, 0), (0, 0, 0)])
+    np.testing.assert_allclose(to_host(row.albedo), albedo, rtol=1e-7)
+    np.testing.assert_array_equal(to_host(row.exponent)[:2], [DIFFUSE, 7])
+    np.testing.assert_array_equal(np.array(row.geometry).T[2:], [(0, 9, 0, 1), (0, 0, 0, 0)])

@@ -41,6 +41,9 @@ IMPLICIT, EXPLICIT = {"mode": "implicit"}, {"mode": "explicit"}
 GUIDED: dict[str, Any] = {"mode": "guided"}
 ONE_SPHERE = "light samples of one sphere have all of its light on diffuse surfaces"
 NO_FACETS = "there are no facets, which alone have patches"
+NOTHING_FILLS = "there are no facets, which alone fill pixels"
+TOO_MUCH = "too much may stand before the facets"
+AT_ONCE = "lanes follow camera rays and others at once"
 ONE_BOUNCE = "1 bounce: nothing comes after the direct light"
 
 COURSE_NAMES = {
@@ -147,6 +150,7 @@ def test_triangles_alone() -> None:
     found = features(TRIANGLE, PANEL)
     assert found == {
         "triangles",
+        "covered_pixels",
         "diffuse",
         "emission",
         "direct_light",
@@ -173,7 +177,8 @@ def test_without_light_nothing_is_left(mode: str) -> None:
 @pytest.mark.parametrize("mode", Mode)
 def test_without_bounces_or_surfaces_only_emission_is_left(mode: str) -> None:
     emission = {"spheres", "triangles", "emission"}
-    assert features(BALL, TRIANGLE, LAMP, bounces=0, mode=mode) == emission
+    covered = features(BALL, TRIANGLE, LAMP, bounces=0, mode=mode)
+    assert covered == emission | {"covered_pixels"}
     assert features(LAMP, PANEL, mode=mode) == emission
 
 
@@ -215,6 +220,11 @@ def test_every_feature_is_told() -> None:
         ("guiding", (False, NO_FACETS), [STRIPES, LAMP], GUIDED),
         ("guiding", (False, "no facet is diffuse"), [BALL, SMOOTH, LAMP], GUIDED),
         ("guiding", (False, ONE_BOUNCE), [*HOUSE], GUIDED | {"bounces": 1}),
+        ("covered_pixels", (True, "what fills a pixel need not be looked for"), [*HOUSE], {}),
+        ("covered_pixels", (False, NOTHING_FILLS), [BALL, LAMP], {}),
+        ("covered_pixels", (False, TOO_MUCH), [ROOM, *BALLS, LAMP], {}),
+        ("covered_pixels", (False, TOO_MUCH), [ROOM, PANELS, LAMP], {}),
+        ("covered_pixels", (False, AT_ONCE), [TRIANGLE, LAMP], {"bounces": 3}),
         ("regeneration", (False, "the scene is a room"), [ROOM, LAMP], {"bounces": 3}),
         ("regeneration", (False, "2 bounces, less than 3"), [BALL, LAMP], {}),
         ("regeneration", (True, "an open scene, up to 3 bounces"), [BALL, LAMP], {"bounces": 3}),

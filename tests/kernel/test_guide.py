@@ -16,7 +16,7 @@ from drpt.kernel import launch, learning
 from drpt.kernel.device_scene import to_device as upload
 from drpt.kernel.guide import SLOTS, Guide, share_out
 from drpt.kernel.intersect import Hit
-from drpt.kernel.launch import learned, make_launcher, prepare
+from drpt.kernel.launch import forget, make_launcher
 from drpt.kernel.patches import COLUMNS, MOST_ROWS, Patches, make_patches
 from drpt.kernel.primitives import FACET_LIMIT, make_primitives
 from tests.conftest import TYPES, to_device, to_host, unit_square
@@ -171,7 +171,7 @@ def hit_at(points: Floats, primitive: int) -> Hit:
     p = to_device(points)
     number = dr.full(TYPES.UInt32, primitive, len(points))
     yes = dr.full(TYPES.Bool, True, len(points))
-    return Hit(yes, p.x, number, p, p, p, yes)
+    return Hit(yes, p.x, number, p, p, p, yes, p, p.x)
 
 
 def test_a_hit_far_outside_its_facet_is_in_no_patch(guide: Guide) -> None:
@@ -214,8 +214,7 @@ def test_without_facets_it_is_mis() -> None:
 
 def test_knowledge_is_the_same_each_time() -> None:
     first = drpt.render(with_picture(BOX, 16, 16), 4, 3, "guided").image
-    learned.cache_clear()
-    prepare.cache_clear()
+    forget()
     again = drpt.render(with_picture(BOX, 16, 16), 4, 3, "guided").image
     np.testing.assert_array_equal(again, first)
 

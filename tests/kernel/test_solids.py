@@ -14,7 +14,7 @@ import drpt
 from drpt.kernel.camera import Ray
 from drpt.kernel.estimator import Mode
 from drpt.kernel.intersect import SPAWN_OFFSET, closest_hit, occluded
-from drpt.kernel.launch import make_launcher, prepare
+from drpt.kernel.launch import forget, make_launcher
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.solids import FOLD, THINNEST, find_bodies, make_solids
 from tests.conftest import TYPES, to_host
@@ -198,7 +198,7 @@ def worlds(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> t
     shapes = SCENES[request.param]
     bodies = World(shapes)
     monkeypatch.setattr("drpt.kernel.primitives.make_solids", lambda *_: ())
-    prepare.cache_clear()
+    forget()
     facets = World(shapes)
     assert bodies.scene.solids
     assert not bodies.scene.loose_facets
@@ -306,7 +306,7 @@ def test_pictures_of_bodies_are_those_of_facets(mode: str, monkeypatch: pytest.M
     scene = replace(scene, camera=replace(scene.camera, width=64, height=64))
     bodies = drpt.render(scene, 16, 4, mode, sampler="independent").image
     monkeypatch.setattr("drpt.kernel.primitives.make_solids", lambda *_: ())
-    prepare.cache_clear()
+    forget()
     facets = drpt.render(scene, 16, 4, mode, sampler="independent").image
     close = np.isclose(bodies, facets, rtol=1e-3).all(axis=2)
     assert close.mean() > 0.99

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import drjit as dr
 
 from drpt.kernel.primitives import DIFFUSE
-from drpt.kernel.vec import frame, reflect, vec3
+from drpt.kernel.vec import frame, reflect
 from drpt.kernel.warp import (
     INV_PI,
     cosine_hemisphere_pdf,
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from drjit.auto import Array2f, Array3f, Bool, Float
 
-    from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
     from drpt.kernel.intersect import Hit
 
@@ -116,11 +115,6 @@ class Brdf(NamedTuple):
         )
 
 
-def make_brdf(scene: DeviceScene, features: Features, hit: Hit, to_viewer: Array3f) -> Brdf:
+def make_brdf(features: Features, hit: Hit, to_viewer: Array3f) -> Brdf:
     """The reflection at a hit; black where there is none."""
-    if not (features.diffuse or features.phong):
-        black = scene.types.Array3f(0)
-        return Brdf(features, black, black.x, hit.normal, hit.shading_normal, to_viewer)
-    row = dr.gather(scene.types.Array4f, scene.reflectance, hit.primitive, hit.valid)
-    albedo = vec3(row[0], row[1], row[2])
-    return Brdf(features, albedo, row[3], hit.normal, hit.shading_normal, to_viewer)
+    return Brdf(features, hit.albedo, hit.exponent, hit.normal, hit.shading_normal, to_viewer)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -14,9 +14,10 @@ from drpt.kernel.mesh import TriangleMesh
 from drpt.kernel.primitives import LUMINANCE, SPHERE_LIMIT
 from drpt.kernel.solids import edge_owners
 from drpt.kernel.sphere_tree import SphereTree
+from drpt.kernel.vec import gather_row
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from types import ModuleType
 
     from drjit.auto import Array3f, Array4f, Float, UInt32
@@ -43,6 +44,25 @@ class Ball:
     power: Float | None = None
 
 
+class SurfaceRow(NamedTuple):
+    """Geometry of a primitive, (normal, offset) or (centre, radius), and how it reflects.
+
+    Lights are black.
+    """
+
+    geometry: Array4f
+    albedo: Array3f
+    exponent: Float
+
+
+class LightRow(NamedTuple):
+    """The same geometry of a light, its radiance and area."""
+
+    geometry: Array4f
+    radiance: Array3f
+    area: Float
+
+
 @dataclass
 class DeviceScene:
     """Primitives as kernels see them; the numbers of primitives are those of `Primitives`.
@@ -62,17 +82,14 @@ class DeviceScene:
         The triangles that emit, as facets where they are few, else as a mesh.
     balls, sphere_tree
         Each sphere, where they are few; else all of them.
-    geometry
-        Rows of 4 by primitive: (normal, offset) or (centre, radius).
-    reflectance
-        Rows of 4 by primitive: (albedo, exponent).
+    surfaces
+        Rows of 8 by primitive, see `SurfaceRow`.
     smooth
         18 by smooth triangle: its corners, then the normals there.
     lights
-        Rows of 4 by light: (radiance, area).
+        Rows of 8 by light, see `LightRow`.
     only_light
-        The rows of a light that is the only one in ``geometry`` and ``lights``: the same for all
-        lanes, which need not gather them.
+        The row of a light that is the only one: the same for all lanes, which need not gather it.
     light_tree
         Which light is chosen, where there are several.
     light_corners
@@ -92,31 +109,28 @@ class DeviceScene:
     light_mesh: TriangleMesh | None
     balls: tuple[Ball, ...]
     sphere_tree: SphereTree | None
-    geometry: Float
-    reflectance: Float
+    surfaces: Float
     smooth: Float
     lights: Float
-    only_light: tuple[Array4f, Array4f] | None
+    only_light: LightRow | None
     light_tree: LightTree | None
     light_corners: Float
     light_count: int
     sphere_lights: int
 
-    def geometry_row(self, primitive: UInt32, active: Any = True) -> Array4f:
-        """Normal and offset, or centre and radius."""
-        return dr.gather(self.types.Array4f, self.geometry, primitive, active)
+    def surface_row(self, primitive: UInt32, active: Any = True) -> SurfaceRow:
+        """The row of a primitive; zeros for lanes that are not active."""
+        return SurfaceRow(*_row(gather_row(self.surfaces, primitive, 8, active), self.types))
 
-    def light_geometry_row(self, light: UInt32) -> Array4f:
-        """The same of a light."""
+    def light_row(self, light: UInt32) -> LightRow:
+        """The row of a light."""
         if self.only_light:
-            return self.only_light[0]
-        return self.geometry_row(self.first_light + light)
+            return self.only_light
+        return LightRow(*_row(gather_row(self.lights, light, 8), self.types))
 
-    def light_row(self, light: UInt32) -> Array4f:
-        """Radiance and area of a light."""
-        if self.only_light:
-            return self.only_light[1]
-        return dr.gather(self.types.Array4f, self.lights, light)
+
+def _row(numbers: Sequence[Float], types: ModuleType) -> tuple[Array4f, Array3f, Float]:
+    return types.Array4f(*numbers[:4]), types.Array3f(*numbers[4:7]), numbers[7]
 
 
 def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
@@ -131,7 +145,11 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     loose = tuple(_loose(primitives, solids))
     reach = _reach(primitives, [number for number, *_ in loose])
     geometry = np.concatenate([planes, primitives.spheres, lit_planes])
-    lights = np.column_stack([primitives.radiance, primitives.light_areas()])
+    black = np.zeros((len(primitives.radiance), 4))
+    surfaces = np.column_stack([geometry, np.concatenate([primitives.reflectance, black])])
+    lights = np.column_stack(
+        [geometry[len(geometry) - len(black) :], primitives.radiance, primitives.light_areas()]
+    )
     return DeviceScene(
         types=types,
         first_smooth=primitives.first_smooth,
@@ -146,15 +164,12 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
         balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
         sphere_tree=None if few_spheres else SphereTree(primitives.spheres, first, types, array),
-        geometry=array(geometry),
-        reflectance=array(primitives.reflectance),
+        surfaces=array(surfaces),
         smooth=array(
             np.concatenate([primitives.smooth_corners, primitives.smooth_normals], axis=1)
         ),
         lights=array(lights),
-        only_light=(_uniform(geometry[-1], types), _uniform(lights[0], types))
-        if len(lights) == 1
-        else None,
+        only_light=_uniform(lights[0], types) if len(lights) == 1 else None,
         light_tree=_light_tree(primitives, types, array),
         light_corners=array(primitives.light_corners),
         light_count=len(primitives.radiance),
@@ -205,9 +220,9 @@ def to_device(values: NDArray[np.float64], types: ModuleType) -> Float:
     return copy
 
 
-def _uniform(row: NDArray[np.float64], types: ModuleType) -> Array4f:
-    """Four numbers that are inputs of the kernel, the same for all lanes."""
-    return types.Array4f(*(dr.opaque(types.Float32, float(value)) for value in row))
+def _uniform(row: NDArray[np.float64], types: ModuleType) -> LightRow:
+    """A row of numbers that are inputs of the kernel, the same for all lanes."""
+    return LightRow(*_row([dr.opaque(types.Float32, float(value)) for value in row], types))
 
 
 def _ball(row: NDArray[np.float64], types: ModuleType) -> Ball:

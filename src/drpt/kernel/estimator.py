@@ -77,6 +77,8 @@ class Features:
         Weights for both ways to find a light.
     guiding
         Directions towards what reflects much light, from diffuse facets.
+    covered_pixels
+        Camera rays are not traced where one facet fills the whole pixel, with nothing before it.
     regeneration
         A path starts where another one has ended, instead of waiting for its neighbours: in open
         scenes, with 3 bounces or more.
@@ -97,6 +99,7 @@ class Features:
     triangle_light_samples: bool
     mis: bool
     guiding: bool
+    covered_pixels: bool
     regeneration: bool
     shared_rays: bool
 
@@ -184,13 +187,22 @@ def _order_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, 
     """Decide in which order samples are traced."""
     lights, room = len(primitives.radiance), primitives.interior
     few = f"{_number(bounces, 'bounce')}, less than {REGENERATION_BOUNCES}"
+    hierarchies = [fact.holds for fact in _hierarchy_facts(primitives).values()]
+    regeneration = _decide(
+        f"an open scene, up to {bounces} bounces",
+        *_reflecting(primitives, bounces),
+        (bounces >= REGENERATION_BOUNCES, few),
+        (not room, "the scene is a room"),
+    )
     return {
-        "regeneration": _decide(
-            f"an open scene, up to {bounces} bounces",
-            *_reflecting(primitives, bounces),
-            (bounces >= REGENERATION_BOUNCES, few),
-            (not room, "the scene is a room"),
+        "covered_pixels": _decide(
+            "what fills a pixel need not be looked for",
+            *_lit(primitives),
+            (len(primitives.facets) > 0, "there are no facets, which alone fill pixels"),
+            (not any(hierarchies), "too much may stand before the facets"),
+            (not regeneration.holds, "lanes follow camera rays and others at once"),
         ),
+        "regeneration": regeneration,
         "shared_rays": _decide(
             f"a room, lit by one sphere; from {SHARING_SPP} samples per pixel on, by Sobol' points",
             *_sampling(primitives, bounces, mode),

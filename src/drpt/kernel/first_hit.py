@@ -19,7 +19,7 @@ from drpt.kernel.brdf import make_brdf
 from drpt.kernel.camera import make_camera
 from drpt.kernel.estimator import Features, Mode
 from drpt.kernel.intersect import closest_hit
-from drpt.kernel.launch import Launcher, prepare
+from drpt.kernel.launch import Launcher, covered, prepare
 from drpt.kernel.path import Tracer, Vertex
 from drpt.kernel.sampler import SAMPLERS
 from drpt.kernel.vec import vec3
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from drpt.kernel.brdf import Brdf
     from drpt.kernel.camera import Ray
-    from drpt.kernel.intersect import Hit
+    from drpt.kernel.intersect import Hit, Known
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Camera, Scene
@@ -73,12 +73,14 @@ def first_hits(
     """
     with interrupts_put_off():
         primitives, on_device = prepare(scene.shapes, types)
+        features = _features(primitives)
+        covering = covered(scene.camera, scene.shapes, types) if features.covered_pixels else None
         camera = make_camera(scene.camera, primitives.origin, on_device.types)
-        estimator = on_device, _features(primitives), Mode.IMPLICIT, 0
+        estimator = on_device, features, Mode.IMPLICIT, 0
         forward = _axis(scene.camera, on_device.types)
 
     def mean(tracer: Tracer) -> NDArray[np.float64]:
-        launcher = Launcher(tracer, camera, SAMPLERS[sampler], jitter, 1, primitives)
+        launcher = Launcher(tracer, camera, covering, SAMPLERS[sampler], jitter, 1, primitives)
         return _mean(launcher, scene.camera, spp, seed)
 
     far, share, _ = np.moveaxis(mean(_DepthTracer(*estimator, forward)), -1, 0)
@@ -126,11 +128,10 @@ def _split(count: int, size: int) -> list[range]:
 class _FirstHitTracer(Tracer, ABC):
     """A tracer of camera rays alone, with a feature of what they meet for the radiance."""
 
-    def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
+    def first_vertex(self, ray: Ray, sampler: Sampler, known: Known | None = None) -> Vertex:
         path = self.start(ray)
-        hit = closest_hit(self.scene, self.features, ray, path.active)
-        reflects = hit.valid & (hit.primitive < self.scene.first_light)
-        brdf = make_brdf(self.scene, self.features, hit._replace(valid=reflects), -ray.direction)
+        hit = closest_hit(self.scene, self.features, ray, path.active, known)
+        brdf = make_brdf(self.features, hit, -ray.direction)
         feature = dr.select(hit.valid, self._feature(ray, hit, brdf), 0)
         return Vertex(path._replace(radiance=feature), hit, brdf, path.patch)
 

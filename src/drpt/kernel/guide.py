@@ -19,7 +19,7 @@ import drjit as dr
 import numpy as np
 
 from drpt.kernel.patches import COLUMNS
-from drpt.kernel.vec import vec2, vec3
+from drpt.kernel.vec import gather_row, vec2, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,14 +63,14 @@ class DevicePatches:
         self._types = types
         corner = np.column_stack([patches.corner, patches.facet])
         right = np.column_stack([patches.right, patches.area])
-        up = np.pad(patches.up, ((0, 0), (0, 1)))
+        up = np.pad(patches.up, ((0, 0), (0, 5)))
         self._rows = upload(np.concatenate([corner, right, up], axis=1))
 
     def spot(self, patch: UInt32, u: Array2f, active: Any = True) -> Spot:
         """Area: a point of a patch, uniform."""
         types = self._types
-        rows = (dr.gather(types.Array4f, self._rows, 3 * patch + k, active) for k in range(3))
-        corner, right, up = rows
+        row = gather_row(self._rows, patch, 16, active)
+        corner, right, up = row[:4], row[4:8], row[8:]
         point = [dr.fma(right[k], u.x, dr.fma(up[k], u.y, corner[k])) for k in range(3)]
         return Spot(vec3(*point), types.UInt32(corner[3]), right[3])
 
@@ -104,11 +104,10 @@ class Guide:
         """The patch of a hit; 0 where that is not on a facet."""
         types, p = self._types, hit.point
         on_facet = hit.valid & (hit.primitive < self._facets)
-        rows = (
-            dr.gather(types.Array4f, self._frames, 2 * hit.primitive + k, on_facet)
-            for k in range(2)
+        f = gather_row(self._frames, hit.primitive, 8, on_facet)
+        column, row = (
+            dr.fma(r[0], p.x, dr.fma(r[1], p.y, dr.fma(r[2], p.z, r[3]))) for r in (f[:4], f[4:])
         )
-        column, row = (dr.fma(r[0], p.x, dr.fma(r[1], p.y, dr.fma(r[2], p.z, r[3]))) for r in rows)
         inside = (column >= 0) & (column < COLUMNS) & (row >= 0) & (row < self._patches // COLUMNS)
         patch = types.UInt32(dr.fma(dr.floor(row), COLUMNS, column))
         return dr.select(inside, patch, 0)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import drjit as dr
 
-from drpt.kernel.device_scene import Ball
+from drpt.kernel.device_scene import Ball, SurfaceRow
 from drpt.kernel.meet import (
     dot_constant,
     meet_facet,
@@ -44,12 +44,24 @@ shaded by it. The back of a light hides nothing. Of two such lights the later on
 """
 
 
+UNKNOWN = 2**32 - 1
+"""Stands for the number of a facet where it is not known which one a ray meets."""
+
+
+class Known(NamedTuple):
+    """The number of the facet that a ray is known to meet first, or `UNKNOWN`, and its row."""
+
+    facet: UInt32
+    row: SurfaceRow
+
+
 class Hit(NamedTuple):
     """Where a ray meets a surface.
 
     ``point`` lies off the surface by its rounding error, towards where the ray comes from, and both
     unit normals face that side. ``front`` tells whether it is the side that emits: outside
-    of a sphere, the counter-clockwise side of a triangle.
+    of a sphere, the counter-clockwise side of a triangle. ``albedo`` and ``exponent`` tell how it
+    reflects; a light does not.
     """
 
     valid: Bool
@@ -59,10 +71,24 @@ class Hit(NamedTuple):
     normal: Array3f
     shading_normal: Array3f
     front: Bool
+    albedo: Array3f
+    exponent: Float
 
 
-def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
-    """The first surface that a ray meets."""
+def closest_hit(
+    scene: DeviceScene, features: Features, ray: Ray, active: Bool, known: Known | None = None
+) -> Hit:
+    """The first surface that a ray meets; it is looked for where it is not known."""
+    if known is None:
+        nearest, primitive = _nearest(scene, ray, active)
+        row = scene.surface_row(primitive, active & (nearest < dr.inf))
+    else:
+        nearest, primitive, row = _known_or_nearest(scene, ray, active, known)
+    return _surface(scene, features, ray, nearest, primitive, row, active & (nearest < dr.inf))
+
+
+def _nearest(scene: DeviceScene, ray: Ray, active: Bool) -> tuple[Float, UInt32]:
+    """How far it is to the first primitive that a ray meets, and its number."""
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
     for solid in scene.solids:
         number, met, t = meet_solid(ray, solid)
@@ -73,8 +99,26 @@ def closest_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) 
         closer = met & (t <= nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
-    nearest, primitive = _or_light_triangle(scene, ray, active, nearest, primitive)
-    return _surface(scene, features, ray, nearest, primitive, active & (nearest < dr.inf))
+    return _or_light_triangle(scene, ray, active, nearest, primitive)
+
+
+def _known_or_nearest(
+    scene: DeviceScene, ray: Ray, active: Bool, known: Known
+) -> tuple[Float, UInt32, SurfaceRow]:
+    """The same, and the row of the primitive; lanes of which all is known jump over the search."""
+
+    def look_up() -> tuple[Any, ...]:
+        plane = known.row.geometry
+        normal = vec3(plane[0], plane[1], plane[2])
+        height = plane[3] - dr.dot(normal, ray.origin)
+        return height * dr.rcp(dr.dot(normal, ray.direction)), known.facet, *known.row
+
+    def search() -> tuple[Any, ...]:
+        nearest, primitive = _nearest(scene, ray, active)
+        return nearest, primitive, *scene.surface_row(primitive, active & (nearest < dr.inf))
+
+    nearest, primitive, *row = dr.if_stmt((), known.facet != UNKNOWN, look_up, search)
+    return nearest, primitive, SurfaceRow(*row)
 
 
 def light_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
@@ -95,7 +139,8 @@ def light_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) ->
     nearest, primitive = _or_light_triangle(scene, ray, active, nearest, primitive)
     seen = active & (nearest < dr.inf)
     seen &= ~occluded(scene, ray, nearest, primitive - scene.first_light, seen)
-    return _surface(scene, features, ray, nearest, primitive, seen)
+    row = scene.surface_row(primitive, seen)
+    return _surface(scene, features, ray, nearest, primitive, row, seen)
 
 
 def _or_light_triangle(
@@ -203,17 +248,22 @@ def _light_triangles(
     if scene.light_mesh is not None:
         index, met, t = scene.light_mesh.closest(ray, active)
         found = first + index
-        row = scene.geometry_row(found, met)
-        front = dr.dot(vec3(row[0], row[1], row[2]), ray.direction) < 0
+        plane = scene.surface_row(found, met).geometry
+        front = dr.dot(vec3(plane[0], plane[1], plane[2]), ray.direction) < 0
         yield found, met if target is None else met & (target != found), t, front
 
 
 def _surface(
-    scene: DeviceScene, features: Features, ray: Ray, t: Float, primitive: UInt32, valid: Bool
+    scene: DeviceScene,
+    features: Features,
+    ray: Ray,
+    t: Float,
+    primitive: UInt32,
+    row: SurfaceRow,
+    valid: Bool,
 ) -> Hit:
-    row = scene.geometry_row(primitive, valid)
     p = dr.fma(ray.direction, t, ray.origin)
-    point, normal, reach = _on_primitive(scene, features, row, p, ray, primitive)
+    point, normal, reach = _on_primitive(scene, features, row.geometry, p, ray, primitive)
     front = dr.dot(normal, ray.direction) < 0
     facing = dr.select(front, normal, -normal)
     shading_normal = facing
@@ -224,7 +274,7 @@ def _surface(
         reach = greater(reach, dr.gather(type(t), scene.reach, primitive, in_mesh))
     away = _away(scene, features, facing, ray.direction, primitive)
     spawn = dr.fma(away, SPAWN_OFFSET * reach, point)
-    return Hit(valid, t, primitive, spawn, facing, shading_normal, front)
+    return Hit(valid, t, primitive, spawn, facing, shading_normal, front, row.albedo, row.exponent)
 
 
 _Place: TypeAlias = "tuple[Array3f, Array3f, Float]"

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import drjit as dr
 import numpy as np
 
 from drpt.kernel.camera import DeviceCamera, make_camera
+from drpt.kernel.coverage import covering_facets
 from drpt.kernel.denormals import flush_denormals
 from drpt.kernel.device_scene import DeviceScene, upload
 from drpt.kernel.estimator import Features
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from drpt.kernel.path import Path
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
-    from drpt.scene import Scene, Shape
+    from drpt.scene import Camera, Scene, Shape
 
 
 PATHS_PER_RAY = 4
@@ -68,11 +69,12 @@ class Launcher:
 
     So many samples after each other as ``paths_per_ray`` share their camera ray and the light
     that its first vertex gets from lights, from a multiple of that number on; each sample goes on
-    from there by itself.
+    from there by itself. ``covering`` are the numbers of the facets that fill the camera's pixels.
     """
 
     tracer: Tracer
     camera: DeviceCamera
+    covering: UInt32 | None
     sampler: type[Sampler]
     jitter: bool
     paths_per_ray: int
@@ -86,7 +88,7 @@ class Launcher:
         """
         work = self._work(pixels, samples, run, _word_of(seed, samples))
         runs = max(1, -(-work.rays // work.run))
-        return self._launch(work._replace(sharing=runs), runs)
+        return self._launch(work._replace(lanes=runs, sharing=runs))
 
     def launch_passes(self, pixels: range, samples: range, passes: range, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range, once in each independent pass.
@@ -94,12 +96,12 @@ class Launcher:
         The same kernel as that of :meth:`launch`; ``radiance`` is (passes, pixels, 3).
         """
         work = self._work(pixels, samples, len(samples), _seed_word(seed) + passes.start)
-        return self._launch(work, len(passes))
+        return self._launch(work._replace(lanes=len(passes)))
 
     def single_paths(self, pixel: int, samples: range, seed: int) -> SinglePaths:
         """The same paths as :meth:`launch` traces of a pixel, before their first vertex."""
         work = self._work(range(pixel, pixel + 1), samples, 1, _word_of(seed, samples))
-        lanes = self._lanes(work._replace(sharing=len(samples)), len(samples))
+        lanes = self._lanes(work._replace(lanes=len(samples), sharing=len(samples)))
         number = lanes.work.first_ray * lanes.work.paths + lanes.work.skipped
         number += dr.arange(type(number), len(samples))
         own, shared = lanes.sampler_at(number), lanes.sampler_at(number // lanes.work.paths)
@@ -117,31 +119,35 @@ class Launcher:
             stop=stop,
             rays=-(-stop // paths),
             run=-(-run // paths),
+            lanes=1,
             sharing=1,
             seed=seed_word & 0xFFFFFFFF,
         )
 
-    def _launch(self, work: Work, lanes: int) -> Sums:
+    def _launch(self, work: Work) -> Sums:
         """Trace with so many lanes for each pixel; ``radiance`` is (lanes, pixels, 3)."""
         if not self.tracer.features.emission:
-            return Sums(np.zeros((lanes, work.pixels, 3)), 0, 0)
-        totals = self._trace(self._lanes(work, lanes))
-        # One array, rows of three, by the kernel that makes it.
-        radiance: Any = dr.ravel(totals.radiance)
+            return Sums(np.zeros((work.lanes, work.pixels, 3)), 0, 0)
+        lanes = self._lanes(work)
+        totals = self._trace(lanes)
+        # One array, by the kernel that makes it.
+        radiance = dr.empty(self.tracer.scene.types.Float64, 3 * lanes.count)
+        dr.scatter(radiance, totals.radiance, lanes.place)
         with flush_denormals():
             dr.eval(radiance, totals.rays, totals.non_finite)
             dr.sync_thread()
-        by_pixel = radiance.numpy().reshape(lanes, work.pixels, 3)
+        by_pixel = radiance.numpy().reshape(work.lanes, work.pixels, 3)
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 
-    def _lanes(self, work: Work, lanes: int) -> Lanes:
+    def _lanes(self, work: Work) -> Lanes:
         index = self.tracer.scene.types.UInt32
         return Lanes(
             self.tracer,
             self.camera,
+            self.covering,
             self.sampler,
             jitter=self.jitter,
-            lane=dr.arange(index, work.pixels * lanes),
+            lane=dr.arange(index, work.pixels * work.lanes),
             work=Work(*(dr.opaque(index, n) for n in work)),
         )
 
@@ -182,7 +188,8 @@ def make_launcher(
     tracer = Tracer(device_scene, features, mode, bounces, guide=guide)
     camera = make_camera(scene.camera, primitives.origin, device_scene.types)
     paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
-    return Launcher(tracer, camera, SAMPLERS[sampler], jitter, paths_per_ray, primitives)
+    covering = covered(scene.camera, scene.shapes, types) if features.covered_pixels else None
+    return Launcher(tracer, camera, covering, SAMPLERS[sampler], jitter, paths_per_ray, primitives)
 
 
 @lru_cache(maxsize=1)
@@ -198,6 +205,20 @@ def prepare(shapes: tuple[Shape, ...], types: ModuleType) -> tuple[Primitives, D
 def learned(shapes: tuple[Shape, ...], types: ModuleType) -> Guide:
     """What is known of shapes with diffuse facets: kept like them."""
     return learn(*prepare(shapes, types))
+
+
+@lru_cache(maxsize=1)
+def covered(camera: Camera, shapes: tuple[Shape, ...], types: ModuleType) -> UInt32:
+    """Numbers of the facets that fill pixels: kept for the next render by the same camera."""
+    primitives, scene = prepare(shapes, types)
+    numbers: UInt32 = scene.types.UInt32(covering_facets(camera, primitives).ravel())
+    return numbers
+
+
+def forget() -> None:
+    """Forget all that is kept for the next render."""
+    for kept in (prepare, learned, covered):
+        kept.cache_clear()
 
 
 def _seed_word(seed: int) -> int:

@@ -116,5 +116,5 @@ class _Exchange:
         return dr.select(seen & dr.isfinite(light), light, 0)
 
     def _normal(self, spot: Spot) -> Array3f:
-        row = self.tracer.scene.geometry_row(spot.facet)
-        return vec3(row[0], row[1], row[2])
+        plane = self.tracer.scene.surface_row(spot.facet).geometry
+        return vec3(plane[0], plane[1], plane[2])

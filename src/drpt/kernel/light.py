@@ -63,7 +63,6 @@ def sample_light(
 ) -> LightSample:
     """Solid angle: a direction from a receiver to a chosen light."""
     light = choice.light
-    row = scene.light_row(light)
     aim = Aim(
         *_by_kind(
             scene,
@@ -73,7 +72,7 @@ def sample_light(
             lambda: tuple(_aim_at_triangle(scene, at.point, light, u)),
         )
     )
-    radiance = vec3(row[0], row[1], row[2])
+    radiance = scene.light_row(light).radiance
     return LightSample(aim.direction, aim.distance, radiance, aim.inverse_pdf / choice.pmf)
 
 
@@ -143,7 +142,7 @@ def _cap(scene: DeviceScene, at: Receiver, light: UInt32) -> _Cap:
     Close to the light it decides how much of its horizon is seen. A point that is not a number
     has a cap that is none, so that its samples are counted.
     """
-    row = scene.light_geometry_row(light)
+    row = scene.light_row(light).geometry
     to_center = vec3(row[0], row[1], row[2]) - at.point
     radius = row[3]
     distance = dr.norm(to_center)
@@ -159,7 +158,7 @@ def _cap(scene: DeviceScene, at: Receiver, light: UInt32) -> _Cap:
 def _aim_at_sphere(scene: DeviceScene, mode: Mode, at: Receiver, light: UInt32, u: Array2f) -> Aim:
     if mode.samples_cones:
         return _aim_at_cap(_cap(scene, at, light), at.normal, u)
-    row = scene.light_geometry_row(light)
+    row = scene.light_row(light).geometry
     normal = square_to_sphere(u)
     radius = row[3]
     target = dr.fma(normal, radius, vec3(row[0], row[1], row[2]))
@@ -182,7 +181,7 @@ def _aim_at_triangle(scene: DeviceScene, point: Array3f, light: UInt32, u: Array
     a, b, c = (dr.gather(scene.types.Array3f, scene.light_corners, 3 * index + k) for k in range(3))
     weights = square_to_triangle(u)
     target = a + weights.x * (b - a) + weights.y * (c - a)
-    row = scene.light_geometry_row(light)
+    row = scene.light_row(light).geometry
     return _aim_at_point(point, target, vec3(row[0], row[1], row[2]), _area(scene, light))
 
 
@@ -196,7 +195,7 @@ def _aim_at_point(point: Array3f, target: Array3f, normal: Array3f, area: Float)
 
 
 def _area(scene: DeviceScene, light: UInt32) -> Float:
-    return scene.light_row(light)[3]
+    return scene.light_row(light).area
 
 
 def power_heuristic(ratio: Float) -> Float:

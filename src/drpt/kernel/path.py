@@ -26,7 +26,7 @@ import drjit as dr
 from drpt.kernel.brdf import Brdf, make_brdf
 from drpt.kernel.camera import Ray
 from drpt.kernel.guide import GUIDED, NOWHERE
-from drpt.kernel.intersect import Hit, closest_hit, light_hit, occluded
+from drpt.kernel.intersect import Hit, Known, closest_hit, light_hit, occluded
 from drpt.kernel.light import (
     LightSample,
     Receiver,
@@ -35,7 +35,7 @@ from drpt.kernel.light import (
     power_heuristic,
     sample_light,
 )
-from drpt.kernel.vec import vec2, vec3
+from drpt.kernel.vec import vec2
 from drpt.kernel.warp import cosine_hemisphere_pdf, sphere_pdf, square_to_sphere
 
 if TYPE_CHECKING:
@@ -98,9 +98,9 @@ class Tracer:
     bounces: int
     guide: Guide | None = field(default=None, kw_only=True)
 
-    def first_vertex(self, ray: Ray, sampler: Sampler) -> Vertex:
-        """What camera rays meet, and the light that it sends."""
-        return self.arrive(self.start(ray), sampler, 0)
+    def first_vertex(self, ray: Ray, sampler: Sampler, known: Known | None = None) -> Vertex:
+        """What camera rays meet, which may be known, and the light that it sends."""
+        return self.arrive(self.start(ray), sampler, 0, known)
 
     def start(self, ray: Ray) -> Path:
         """Paths along camera rays, which no light sample finds: their density is infinite."""
@@ -162,10 +162,12 @@ class Tracer:
         is_last = isinstance(depth, int) and depth == self.vertices - 1
         return vertex.path if is_last else self.leave(vertex, sampler, depth)
 
-    def arrive(self, path: Path, sampler: Sampler, depth: Any) -> Vertex:
+    def arrive(
+        self, path: Path, sampler: Sampler, depth: Any, known: Known | None = None
+    ) -> Vertex:
         """Find the next vertex, and collect the light that it sends."""
         features, is_first, reflects = self.features, depth == 0, depth < self.bounces
-        path, hit, patch = self._meet(path, depth)
+        path, hit, patch = self._meet(path, depth, known)
         radiance, rays = path.radiance, path.rays + dr.select(path.active, 1, 0)
         if self.counts_hits or is_first is not False:
             counts = True if self.counts_hits else is_first
@@ -173,7 +175,7 @@ class Tracer:
             emitted = self._emission(path, hit, counts, weighted=weighted)
             radiance = radiance + path.beta * emitted
         hit = hit._replace(valid=hit.valid & (hit.primitive < self.scene.first_light) & reflects)
-        brdf = make_brdf(self.scene, features, hit, -path.direction)
+        brdf = make_brdf(features, hit, -path.direction)
         # After the last bounce there is but light, which a guide knows nothing of.
         guided = brdf.is_diffuse & (depth + 1 < self.bounces)
         vertex = Vertex(path, hit, brdf, dr.select(guided, patch, type(patch)(0)))
@@ -183,13 +185,13 @@ class Tracer:
             rays = rays + dr.select(traced, 1, 0)
         return vertex._replace(path=path._replace(radiance=radiance, rays=rays))
 
-    def _meet(self, path: Path, depth: Any) -> tuple[Path, Hit, UInt32]:
+    def _meet(self, path: Path, depth: Any, known: Known | None) -> tuple[Path, Hit, UInt32]:
         """The paths that arrive where their rays meet something, what that is, and its patch."""
         is_first, ray = depth == 0, Ray(path.origin, path.direction)
         is_end = depth == self.bounces
         if is_end is True and is_first is False:  # that ray was not guided
             return path, light_hit(self.scene, self.features, ray, path.active), path.patch
-        hit = closest_hit(self.scene, self.features, ray, path.active)
+        hit = closest_hit(self.scene, self.features, ray, path.active, known)
         if self.guide is None:
             return path, hit, path.patch
         patch = self.guide.patch_of(hit)
@@ -261,8 +263,7 @@ class Tracer:
         light = scene.types.UInt32(0)
         if scene.light_count > 1:
             light = dr.select(lit, hit.primitive - scene.first_light, 0)
-        row = scene.light_row(light)
-        radiance = vec3(row[0], row[1], row[2])
+        radiance = scene.light_row(light).radiance
         if weighted:
             at, ray = Receiver(path.origin, path.normal), Ray(path.origin, path.direction)
             inverse = inverse_pdf(scene, self.features, at, light, ray, hit._replace(valid=lit))

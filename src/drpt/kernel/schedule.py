@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
+from drpt.kernel.intersect import UNKNOWN, Known
 from drpt.kernel.path import Path
 from drpt.kernel.vec import types_of, vec2
 
@@ -34,7 +35,8 @@ class Work(NamedTuple):
     stop: Any
     rays: Any  # up to the one of the last sample
     run: Any  # camera rays that a lane takes at the most
-    sharing: Any  # lanes that share the samples of a seed
+    lanes: Any  # of each pixel
+    sharing: Any  # of them, that share the samples of a seed
     seed: Any
 
 
@@ -58,25 +60,30 @@ class Totals(NamedTuple):
 class Lanes:
     """Lanes of a launch: a pixel each, and which of its samples.
 
-    Lane number k takes the pixel k mod ``pixels``; of those with the same pixel, so many as
+    Those of the same pixel are neighbours, so that they jump over the same code. So many of them as
     ``sharing`` take the samples of one seed, a run each, and the next ones take the next seed.
+    ``covering`` is the number of the facet that fills each pixel of the camera, if that is known.
+    ``place`` is where the sums of each lane belong, in the order (lanes, pixels).
     """
 
     def __init__(
         self,
         tracer: Tracer,
         camera: DeviceCamera,
+        covering: UInt32 | None,
         sampler: type[Sampler],
         *,
         jitter: bool,
         lane: UInt32,
         work: Work,
     ) -> None:
-        number = lane // work.pixels
+        pixel = lane // work.lanes
+        number = lane - pixel * work.lanes
         which = number // work.sharing
-        self.tracer, self.camera, self.sampler, self.jitter = tracer, camera, sampler, jitter
+        self.tracer, self.camera, self.covering = tracer, camera, covering
+        self.sampler, self.jitter = sampler, jitter
         self.work, self.types = work, types_of(lane)
-        self.pixel = work.first_pixel + lane - number * work.pixels
+        self.pixel, self.place = work.first_pixel + pixel, number * work.pixels + pixel
         self.seed = work.seed + which
         self.first = (number - which * work.sharing) * work.run
         self.last = dr.minimum(self.first + work.run, work.rays)
@@ -84,11 +91,11 @@ class Lanes:
 
     def by_path(self) -> Totals:
         """One path after the other, from camera to end."""
-        first_sample = self.work.first_ray
+        first_sample, known = self.work.first_ray, self._known()
 
         def add_path(sample: UInt32, *totals: Any) -> tuple[Any, ...]:
             sampler = self.sampler_at(first_sample + sample)
-            first = self.tracer.first_vertex(self.camera_ray(sampler), sampler)
+            first = self.tracer.first_vertex(self.camera_ray(sampler), sampler, known)
             traced = self.tracer.follow(first, sampler)
             return sample + 1, *Totals(*totals).plus(*traced)
 
@@ -97,11 +104,11 @@ class Lanes:
     def by_ray(self) -> Totals:
         """One camera ray after the other, each with the paths that share it."""
         work = self.work
-        first_sample = work.first_ray * work.paths
+        first_sample, known = work.first_ray * work.paths, self._known()
 
         def add_ray(ray: UInt32, *totals: Any) -> tuple[Any, ...]:
             sampler = self.sampler_at(work.first_ray + ray)
-            first = self.tracer.first_vertex(self.camera_ray(sampler), sampler)
+            first = self.tracer.first_vertex(self.camera_ray(sampler), sampler, known)
             once = Totals(*totals)
             once = once._replace(rays=once.rays + first.path.rays)
             first = first._replace(path=first.path._replace(rays=self.types.UInt32(0)))
@@ -158,6 +165,13 @@ class Lanes:
         )
         start: tuple[Any, ...] = (self.first, *state, *zeros)
         return dr.while_loop(start, goes_on, body)[1:]
+
+    def _known(self) -> Known | None:
+        """What all camera rays of each lane's pixel meet."""
+        if self.covering is None:
+            return None
+        facet = dr.gather(self.types.UInt32, self.covering, self.pixel)
+        return Known(facet, self.tracer.scene.surface_row(facet, facet != UNKNOWN))
 
     def sampler_at(self, index: UInt32) -> Sampler:
         """The sampler of a sample, or of a camera ray, of each lane's pixel."""

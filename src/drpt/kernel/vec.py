@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import drjit as dr
 
 if TYPE_CHECKING:
-    from drjit.auto import Array2f, Array3f, Float
+    from drjit.auto import Array2f, Array3f, Float, UInt32
 
 
 def types_of(x: Any) -> Any:
@@ -39,6 +39,15 @@ def lesser(a: Any, b: Any) -> Any:
 def largest(v: Array3f) -> Float:
     """The size of the largest component."""
     return greater(greater(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
+
+
+def gather_row(table: Float, row: UInt32, width: int, active: Any = True) -> list[Float]:
+    """The numbers of a row of a table, in one piece, where ``width`` is a power of two.
+
+    A gather is a call in the kernel, which moves all that is in registers out of the way.
+    """
+    kind = types_of(table).ArrayXf
+    return list(dr.gather(kind, table, row, active, shape=(width, len(row))))
 
 
 class Frame(NamedTuple):
