@@ -17,7 +17,7 @@ import drjit as dr
 import numpy as np
 
 from drpt.kernel.sphere_tree import arrange
-from drpt.kernel.vec import greater, lesser, vec3
+from drpt.kernel.vec import gather_row, greater, lesser, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -153,11 +153,12 @@ class LightTree:
     def _children(self, node: UInt32) -> list[_Node]:
         if self._levels == 1:
             return self._constants
-        return [self._row(node * self._width + k) for k in range(self._width)]
-
-    def _row(self, row: UInt32) -> _Node:
-        power, even = dr.gather(self._types.Array2f, self._weights, row)
-        return _Node(dr.gather(self._types.Array4f, self._balls, row), power, even)
+        balls = gather_row(self._balls, node, 4 * self._width)
+        weights = gather_row(self._weights, node, 2 * self._width)
+        return [
+            _Node(self._types.Array4f(balls[4 * k : 4 * k + 4]), *weights[2 * k : 2 * k + 2])
+            for k in range(self._width)
+        ]
 
 
 class _Node(NamedTuple):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
-from drpt.kernel.vec import greater, lesser, types_of, vec3
+from drpt.kernel.vec import gather_row, greater, lesser, types_of, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+WIDTH = 16
+"""Numbers in the row of a node: the boxes of its children, or a sphere and its own number.
+
+That is exact up to 2²⁴."""
 ROOM = 2.0**-20
 """By which boxes are larger than what is in them, relative to the largest coordinate: 8 ulps."""
 
@@ -74,10 +78,9 @@ class SphereTree:
         padded = np.full((self._leaves, 4), np.nan)
         padded[: len(spheres)] = spheres
         order = arrange(padded[:, :3])
-        boxes = boxes_around(padded[order])
-        self._children = upload(boxes)
-        self._spheres = upload(padded[order])
-        self._numbers = types.UInt32((first + order).astype(np.uint32))
+        inner = boxes_around(padded[order]).reshape(-1, 12)
+        leaves = np.column_stack([padded[order], first + order])
+        self._rows = upload(np.concatenate([_widened(inner), _widened(leaves)]))
 
     def walk(
         self, ray: Ray, active: Bool, end: Float, visit: Callable[..., tuple[Float, UInt32]]
@@ -94,11 +97,10 @@ class SphereTree:
             node: UInt32, trail: UInt32, end: Float, found: UInt32
         ) -> tuple[UInt32, UInt32, Float, UInt32]:
             is_leaf = node >= self._leaves
-            slot = node - self._leaves
-            row = dr.gather(types.Array4f, self._spheres, slot, is_leaf)
-            number = dr.gather(types.UInt32, self._numbers, slot, is_leaf)
-            end, found = visit(row, number, is_leaf, end, found)
-            left, right = self._meets_children(ray.origin, inverse, node, end, ~is_leaf)
+            row = gather_row(self._rows, node, WIDTH)
+            end, found = visit(types.Array4f(row[:4]), types.UInt32(row[4]), is_leaf, end, found)
+            left = _meets_box(ray.origin, inverse, end, vec3(*row[0:3]), vec3(*row[3:6]))
+            right = _meets_box(ray.origin, inverse, end, vec3(*row[6:9]), vec3(*row[9:12]))
             nearer = dr.select(right < left, 1, 0)
             second = dr.select(greater(left, right) < dr.inf, 1, 0)
             descends = ~is_leaf & (lesser(left, right) < dr.inf)
@@ -114,15 +116,9 @@ class SphereTree:
         _, _, end, found = dr.while_loop(state, goes_on, step)
         return end, found
 
-    def _meets_children(
-        self, origin: Array3f, inverse: Array3f, node: UInt32, end: Float, inner: Bool
-    ) -> tuple[Float, Float]:
-        """Where a ray enters the boxes of a node's children; infinite where it does not."""
-        types = types_of(end)
-        a, b, c = (dr.gather(types.Array4f, self._children, 3 * node + k, inner) for k in range(3))
-        left = _meets_box(origin, inverse, end, vec3(a[0], a[1], a[2]), vec3(a[3], b[0], b[1]))
-        right = _meets_box(origin, inverse, end, vec3(b[2], b[3], c[0]), vec3(c[1], c[2], c[3]))
-        return left, right
+
+def _widened(rows: Array) -> Array:
+    return np.pad(rows, ((0, 0), (0, WIDTH - rows.shape[1])))
 
 
 def _meets_box(origin: Array3f, inverse: Array3f, end: Float, low: Array3f, high: Array3f) -> Float:
