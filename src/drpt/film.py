@@ -45,7 +45,10 @@ class Film:
         Passes start where the last one has ended, and at multiples of ``run``, a power of two.
         """
         part = slice(pixels.start, pixels.stop)
-        self._total[part] += sums.sum(axis=0)
+        if self.samples:
+            self._total[part] += sums.sum(axis=0)
+        else:
+            np.sum(sums, axis=0, out=self._total[part])
         size = self._size_for(samples.stop, run)
         if len(self._blocks):
             starts = np.arange(samples.start, samples.stop, run)
@@ -69,7 +72,11 @@ class Film:
         if len(block) > 1 + block[-1] - block[0]:  # several runs of a block
             sums = np.add.reduceat(sums, np.flatnonzero(np.diff(block, prepend=-1)), axis=0)
         theirs = blocks[block[0] : block[-1] + 1]
-        np.add(theirs, sums, out=theirs, casting="same_kind")  # memory that is new takes longest
+        # Memory that is new takes longest, and twice as long if it is read before.
+        if self.samples:
+            np.add(theirs, sums, out=theirs, casting="same_kind")
+        else:
+            np.copyto(theirs, sums, casting="same_kind")
 
     def _size_for(self, samples: int, run: int) -> int:
         size = max(self.size, run)

@@ -75,12 +75,12 @@ def test_patches_fit_their_words(kind: str) -> None:
     assert len(patches.facet) <= COLUMNS * (1 + max(MOST_ROWS, FACET_LIMIT)) <= 1024
     assert SLOTS <= 1024
     assert (patches.facet[:COLUMNS] == -1).all()
-    assert (patches.area[patches.facet >= 0] > 0).all()
+    assert (patches.area[patches.there] > 0).all()
 
 
 def test_patches_are_about_of_one_size() -> None:
     patches = make_patches(facets_of(BOX.shapes))
-    area = patches.area[patches.facet >= 0]
+    area = patches.area[patches.there]
     assert 200 < len(area) < 320
     assert area.max() / area.min() < 4
 
@@ -104,13 +104,13 @@ def patches() -> Patches:
 @pytest.fixture
 def guide(patches: Patches) -> Guide:
     """Of random knowledge; patch number 2 of the facets is known nothing of."""
-    light = np.random.default_rng(2).exponential(size=2 * (len(patches.facet),)) ** 2
-    light[np.flatnonzero(patches.facet >= 0)[2]] = 0
+    light = np.random.default_rng(2).exponential(size=2 * (len(patches.there),)) ** 2
+    light[2] = 0
     return Guide(patches, light, TYPES, lambda values: upload(values, TYPES))
 
 
 def existing(patches: Patches) -> list[int]:
-    return list(np.flatnonzero(patches.facet >= 0)[[0, 2, 50, -1]])
+    return list(patches.there[[0, 2, 50, -1]])
 
 
 def test_densities_integrate_to_one(guide: Guide, patches: Patches) -> None:
@@ -183,7 +183,7 @@ def test_a_hit_far_outside_its_facet_is_in_no_patch(guide: Guide) -> None:
 @pytest.mark.parametrize("wrong", ["random", "of one patch", "none"])
 def test_wrong_knowledge_makes_noise_alone(scene: drpt.Scene, wrong: str) -> None:
     def guess(*_: object) -> Floats:
-        count = len(make_patches(facets_of(scene.shapes)).facet)
+        count = len(make_patches(facets_of(scene.shapes)).there)
         light = np.random.default_rng(3).exponential(size=(count, count)) ** 4
         kept = {"random": 1, "of one patch": np.arange(count) == count // 2, "none": 0}
         return np.asarray(light * kept[wrong])

@@ -83,7 +83,7 @@ class Guide:
     patches
         Patches of the scene's facets.
     light
-        How much light arrives at each patch (its first index) from each other.
+        How much light arrives at each of the patches that there are from each other, (k, k).
     types, upload
         The backend, and what brings numbers there, to memory from which rows are gathered.
     """
@@ -93,10 +93,14 @@ class Guide:
     ) -> None:
         self._types = types
         self._facets, self._patches = len(patches.frames), len(patches.facet)
-        counts = share_out(_known(patches, light), SLOTS)
-        area = np.where(patches.facet < 0, 1, patches.area)
-        self._density = upload(counts / SLOTS / area)
-        self._slots = types.UInt32(_slots(counts).ravel())
+        there, area = patches.there, patches.area[patches.there]
+        counts = share_out(_known(light, area), SLOTS)
+        density = np.zeros((self._patches, self._patches), np.float32)
+        density[np.ix_(there, there)] = counts / (SLOTS * area)
+        self._density = types.Float32(density.ravel())
+        slots = np.zeros((self._patches, SLOTS), np.uint32)
+        slots[there] = _slots(counts, there)
+        self._slots = types.UInt32(slots.ravel())
         self._frames = upload(patches.frames)
         self._goals = DevicePatches(patches, types, upload)
 
@@ -136,22 +140,18 @@ def share_out(weights: Array, count: int) -> NDArray[np.intp]:
     return np.diff(np.round(shares * count).astype(np.intp), axis=1, prepend=0)
 
 
-def _known(patches: Patches, light: Array) -> Array:
+def _known(light: Array, area: Array) -> Array:
     """What is known of each patch; where that is nothing, what is known of all together."""
-    there = patches.facet >= 0
-    light = light * np.outer(there, there)
     everywhere = light.sum(axis=0)
     if not everywhere.any():
-        everywhere = patches.area
-    return np.where(light.any(axis=1, keepdims=True), light, everywhere) * there[:, None]
+        everywhere = area
+    return np.where(light.any(axis=1, keepdims=True), light, everywhere)
 
 
-def _slots(counts: NDArray[np.intp]) -> NDArray[np.uint32]:
+def _slots(counts: NDArray[np.intp], numbers: NDArray[np.intp]) -> NDArray[np.uint32]:
     """Rows of `SLOTS` words: a patch, its first slot in the row, and how many follow that."""
-    words = np.zeros((len(counts), SLOTS), np.uint32)
     row, patch = np.nonzero(counts)
     count = counts[row, patch]
     start = (np.cumsum(counts, axis=1) - counts)[row, patch]
-    word = patch | (start << _BITS) | ((count - 1) << (2 * _BITS))
-    words[counts.any(axis=1)] = np.repeat(word, count).reshape(-1, SLOTS)
-    return words
+    word = numbers[patch] | (start << _BITS) | ((count - 1) << (2 * _BITS))
+    return np.repeat(word.astype(np.uint32), count).reshape(-1, SLOTS)

@@ -54,19 +54,17 @@ def learn(primitives: Primitives, scene: DeviceScene) -> Guide:
 
 
 def _exchange(primitives: Primitives, scene: DeviceScene, patches: Patches) -> NDArray[np.float64]:
-    """The light that reaches each patch (its first index) from each other, (n, n)."""
+    """The light that reaches each of the patches that there are from each other, (k, k)."""
     mode = Mode.EXPLICIT if primitives.diffuse.all() else Mode.MIS
     tracer = Tracer(scene, Features.of(primitives, 1, mode), mode, 1)
-    there = np.flatnonzero(patches.facet >= 0)
+    there = patches.there
     on_device = DevicePatches(patches, scene.types, partial(to_device, types=scene.types))
     exchange = _Exchange(tracer, on_device, scene.types.UInt32(there.astype(np.uint32)))
     mean = exchange.light(dr.arange(scene.types.UInt32, len(there) ** 2))
     with flush_denormals():
         dr.eval(mean)
         dr.sync_thread()
-    light = np.zeros((len(patches.facet), len(patches.facet)))
-    light[np.ix_(there, there)] = np.array(mean).reshape(len(there), -1)
-    return light
+    return mean.numpy().reshape(len(there), -1).astype(np.float64)
 
 
 @dataclass

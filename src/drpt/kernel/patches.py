@@ -51,6 +51,11 @@ class Patches(NamedTuple):
     frames: Array
 
     @property
+    def there(self) -> NDArray[np.intp]:
+        """Numbers (k,) of the patches that there are."""
+        return np.flatnonzero(self.facet >= 0)
+
+    @property
     def area(self) -> Array:
         """Area (n,) of each patch."""
         return np.asarray(np.linalg.norm(np.cross(self.right, self.up), axis=1))
