@@ -158,6 +158,39 @@ def test_a_lamp_behind_a_wall_hides_nothing() -> None:
     assert (known(camera(), [lamp, WALL]) == 0).all()
 
 
+@pytest.mark.parametrize("size", [1e-17, 1e-16, 1e-15, 1e-12, 1e-6])
+def test_a_speck_fills_no_pixel(size: float) -> None:
+    speck = drpt.Mesh([(0, 0, 0), (size, 0, 0), (0, 0, size)], [(0, 1, 2)], material=GREY)
+    wall = quad((-9, 1, -9), (18, 0, 0), (0, 0, 18))
+    facets = known(camera((1.3, -5, 0.7)), [speck, wall, LAMP])
+    assert (facets != 0).all()
+    assert np.mean(facets == 1) > 0.9
+
+
+@pytest.mark.parametrize("reach", [1e4, 1e5, 1e7])
+def test_a_tile_before_the_near_edge_of_a_wide_ground(reach: float) -> None:
+    side = 2e-9 * reach
+    tile = quad((-side / 2, 0, -side / 2), (side, 0, 0), (0, 0, side))
+    ground = quad((-reach, -0.45 * side, 0), (2 * reach, 0, 0), (0, 2 * reach, 0))
+    lamp = drpt.Sphere((0, 0, reach / 2), reach / 10, radiance=1)
+    view = camera((0, -3 * side, 3 * side), fov=20)
+    known(view, [tile, ground, lamp])
+
+
+def test_what_the_eye_lies_upon_fills_no_pixel() -> None:
+    """Where float32 cannot tell on which side the eye is."""
+    rng = np.random.default_rng(5)
+    for height in (1e-6, 1e-4):
+        normal = rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        along = np.cross(normal, (0, 1, 0))
+        along /= np.linalg.norm(along)
+        ground = quad(20 * normal - 50 * along, 100 * along, 100 * np.cross(normal, along))
+        eye = 20 * normal + height * normal
+        facets = known(camera(eye, eye + along - 0.3 * normal), [ground, LAMP])
+        assert (facets == UNKNOWN).all()
+
+
 def test_what_is_behind_the_eye_hides_nothing() -> None:
     behind = quad((-1, -6, -1), (2, 0, 0), (0, 0, 2))
     assert (known(camera(), [WALL, behind, LAMP]) == 0).all()

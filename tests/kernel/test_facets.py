@@ -97,6 +97,36 @@ def test_neighbours_that_face_opposite_ways_stay_apart() -> None:
     assert len(merge_coplanar(opposite)) == 2
 
 
+@pytest.mark.parametrize("short", [1e-12, 1e-9, 1e-6])
+def test_of_a_short_edge_one_end_is_left(short: float) -> None:
+    a, b, c, d = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, short, 0)], float)
+    polygons = merge_coplanar([np.array([a, b, c]), np.array([a, c, d])])
+    assert sum(area(polygon) for polygon in polygons) == pytest.approx(0.5, abs=short)
+
+
+def test_a_globe_keeps_its_poles() -> None:
+    """Whose corners are apart there by what is left of sin π."""
+    longitudes, latitudes = np.linspace(0, 2 * np.pi, 9), np.linspace(0, np.pi, 5)
+    globe = [
+        [np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)]
+        for v in latitudes
+        for u in longitudes
+    ]
+    at = np.array(globe).reshape(5, 9, 3)
+    triangles = [
+        np.array(corners)
+        for i in range(4)
+        for j in range(8)
+        for corners in (
+            (at[i, j], at[i + 1, j], at[i + 1, j + 1]),
+            (at[i, j], at[i + 1, j + 1], at[i, j + 1]),
+        )
+        if np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])) > 0
+    ]
+    whole = sum(area(triangle) for triangle in triangles)
+    assert sum(map(area, merge_coplanar(triangles))) == pytest.approx(whole, rel=1e-9)
+
+
 def test_triangles_that_share_no_edge_stay_apart() -> None:
     assert len(merge_coplanar(np.array([SQUARE[[0, 1, 3]], SQUARE[[1, 2, 3]] + 1e-3]))) == 2
 

@@ -32,8 +32,14 @@ if TYPE_CHECKING:
 
 MARGIN = 1 / 16
 """Pixels by which an edge has to be off a pixel, for rounding on the device."""
+ROUNDING = 2.0**-46
+"""Of heights above planes in float64, relative to the coordinates."""
 CLOSE = 2.0**-16
-"""Surfaces that are closer than this, relative to their coordinates, may hide each other."""
+"""By which something must reach beyond a plane that is to be between it and another thing.
+
+Relative to the coordinates, and more than what counts as coincident on the device. So close to a
+plane, an eye may be on either side of it there.
+"""
 NO_PLANE = np.full(4, np.nan)
 TANGENTS = 8
 """Edges of the outline around a sphere."""
@@ -45,7 +51,8 @@ class Item(NamedTuple):
     Points are inside of its outline where the product with each of the normals ``inward`` (k, 3) is
     positive. All of it is between its corners (m, 3), which are balls of ``radius``. ``plane`` is
     that of a facet, (normal, offset) with a positive offset, else not a number. ``size`` is that of
-    the coordinates there. ``number`` is that of a facet that may fill pixels.
+    the coordinates in use, of its points as seen from the eye and of the eye itself, to which
+    errors are relative. ``number`` is that of a facet that may fill pixels.
     """
 
     inward: Array
@@ -66,9 +73,9 @@ def covering_facets(camera: Camera, primitives: Primitives) -> NDArray[np.uint32
     numbers = np.full((camera.height, camera.width), UNKNOWN, np.uint32)
     for item in _from_back_to_front(list(_items(camera.eye - primitives.origin, primitives))):
         edges = rays @ item.inward.T
-        _paint(numbers, UNKNOWN, _spans(edges, 1, numbers.shape))
+        _paint(numbers, UNKNOWN, _spans(edges, numbers.shape, filled=False))
         if item.number != UNKNOWN:
-            _paint(numbers, item.number, _spans(edges, -1, numbers.shape))
+            _paint(numbers, item.number, _spans(edges, numbers.shape, filled=True))
     return numbers
 
 
@@ -85,11 +92,12 @@ def _facet_item(facet: Facet, eye: Array, number: int) -> Item:
     """A polygon; one that is seen edge-on counts as the ball around it."""
     corners, distance = facet.corners - eye, facet.offset - np.dot(facet.normal, eye)
     size = np.abs(corners).max() + np.abs(eye).max()
-    if abs(distance) <= COPLANAR * size:
+    error = CLOSE * (abs(facet.offset) + np.dot(np.abs(facet.normal), np.abs(eye)))
+    if abs(distance) <= max(error, COPLANAR * size):
         middle = facet.corners.mean(axis=0)
         return _ball_item(middle, np.linalg.norm(facet.corners - middle, axis=1).max(), eye)
     side = np.sign(distance)
-    inward = side * np.cross(corners, np.roll(corners, -1, axis=0))
+    inward = side * np.cross(corners, np.roll(facet.corners, -1, axis=0) - facet.corners)
     return Item(inward, corners, 0, side * np.array([*facet.normal, distance]), size, number)
 
 
@@ -111,18 +119,18 @@ def _ball_item(center: Array, radius: float, eye: Array) -> Item:
 
 
 def _from_back_to_front(items: list[Item]) -> Iterator[Item]:
-    """Items such that none hides one that comes earlier and fills pixels.
+    """Items in an order in which what may be before one that fills pixels comes later.
 
-    Nor one that fills none, as far as there is such an order. Where there is none at all, the
-    others come last, and fill no pixels.
+    What fills none comes as early as it may, for it makes pixels unknown that it hardly hides. In
+    a ring of facets that may all hide each other none fills pixels.
     """
     hides, left = _may_hide(items), np.ones(len(items), bool)
     fills = np.array([item.number != UNKNOWN for item in items])
     while left.any():
-        hides_none, hides_no_facet = (
-            ~hides[:, those].any(axis=1) for those in (left, left & fills)
+        hides_nothing, hides_no_facet = (
+            left & ~hides[:, those].any(axis=1) for those in (left, left & fills)
         )
-        choices = (left & hides_none, left & hides_no_facet & ~fills, left & hides_no_facet)
+        choices = hides_nothing, hides_no_facet & ~fills, hides_no_facet
         hindmost = next((choice for choice in choices if choice.any()), None)
         if hindmost is None:
             yield from (items[i]._replace(number=UNKNOWN) for i in np.flatnonzero(left))
@@ -132,16 +140,16 @@ def _from_back_to_front(items: list[Item]) -> Iterator[Item]:
 
 
 def _may_hide(items: list[Item]) -> NDArray[np.bool_]:
-    """Whether each item may be before each other one, shape (items, items).
+    """Whether item i may be before item j, at [i, j].
 
-    It is not if the plane of some facet is between both, with the eye on the side of the other one;
-    nor if a plane through the eye and an edge is.
+    It is not if the plane of some facet is between them, with the eye on the side of j; nor if a
+    plane through the eye and an edge of one of them is.
     """
     points = np.concatenate([item.corners for item in items])
     radii = np.concatenate([np.full(len(item.corners), item.radius) for item in items])
     first = np.cumsum([0, *(len(item.corners) for item in items[:-1])])
     sizes = np.array([item.size for item in items])
-    touching, close = COPLANAR * sizes, CLOSE * sizes
+    rounding, close = ROUNDING * sizes, CLOSE * sizes
 
     def reach(planes: Array) -> tuple[Array, Array]:
         """Least and greatest height of each item above planes (n, 4), (n, items)."""
@@ -150,31 +158,32 @@ def _may_hide(items: list[Item]) -> NDArray[np.bool_]:
         return low, np.maximum.reduceat(heights + radii, first, axis=1)
 
     low, high = reach(np.array([item.plane for item in items]))
-    beyond, before = low >= -touching, high <= touching
-    well_beyond, well_before = beyond & (high > close), before & (low < -close)
+    before, beyond = high <= rounding, low >= -rounding
+    well_before, well_beyond = before & (low < -close), beyond & (high > close)
+    # A product of truths tells whether there is a plane for which both hold.
     behind = well_beyond.T @ before | beyond.T @ well_before
     edges = np.concatenate([item.inward for item in items])
-    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
-    _, high = reach(np.pad(edges, ((0, 0), (0, 1))))
+    edges = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    _, above_edge = reach(np.pad(edges, ((0, 0), (0, 1))))
     owner = np.repeat(np.arange(len(items)), [len(item.inward) for item in items])
     apart = np.eye(len(items), dtype=bool)
-    np.logical_or.at(apart, owner, high <= touching)
+    np.logical_or.at(apart, owner, above_edge <= rounding)
     return np.asarray(~(behind | apart | apart.T))
 
 
-def _spans(edges: Array, sign: int, shape: tuple[int, int]) -> Spans:
-    """Start and stop of the pixels that an outline touches in each row, or with -1 fills.
+def _spans(edges: Array, shape: tuple[int, int], *, filled: bool) -> Spans:
+    """Start and stop of the pixels that an outline touches in each row, or that it fills.
 
     Each column (a, b, c) of ``edges`` is of a line, positive inside.
     """
     height, width = shape
     a, b, c = edges[..., None]
     room = (np.abs(b) + np.abs(c)) * (0.5 + MARGIN)
-    offset = a + c * np.arange(height) + sign * room
+    inside = a + c * np.arange(height) + (-room if filled else room)
     with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = np.clip(-offset / b, -1, width)
-    misses = np.where((b == 0) & (offset < 0), width, 0)
-    starts = np.where(b > 0, np.ceil(crossing), misses)
+        crossing = np.clip(-inside / b, -1, width)
+    outside = (b == 0) & ((inside <= 0) if filled else (inside < 0))
+    starts = np.where(b > 0, np.ceil(crossing), np.where(outside, width, 0))
     stops = np.where(b < 0, np.floor(crossing) + 1, width)
     return (
         starts.max(axis=0, initial=0).astype(np.intp),

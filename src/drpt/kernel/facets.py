@@ -123,10 +123,16 @@ def _is_planar_and_convex(corners: Array) -> bool:
 
 
 def _without_straight_corners(outline: Outline) -> Outline:
+    """Leave out what turns by nothing, one after the other: of a short edge one end is kept."""
     corners = np.array(outline)
-    extent = np.ptp(corners, axis=0).max()
-    turning = np.linalg.norm(_turns(corners), axis=1) > COPLANAR * extent**2
-    return tuple(corner for corner, turns in zip(outline, turning, strict=True) if turns)
+    least = COPLANAR * np.ptp(corners, axis=0).max() ** 2
+    kept = [*range(len(corners))]
+    while len(kept) > 3:
+        turning = np.linalg.norm(_turns(corners[kept]), axis=1) > least
+        if turning.all():
+            break
+        del kept[turning.argmin()]
+    return tuple(outline[k] for k in kept)
 
 
 def unit_normal(corners: Array) -> Array:
