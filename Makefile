@@ -37,7 +37,7 @@ docs: $(STAMP) out/docs/gallery/index.html  ## build the documentation to out/do
 out/docs/gallery/index.html: $(shell find src/drpt scenes -type f -not -name '*.pyc') | $(STAMP)
 	$(BIN)/drpt gallery -o $(@D)
 
-bench: $(STAMP)  ## error against time, beside Mitsuba: tables and plots in out/bench, 20 minutes
+bench: $(STAMP)  ## error against time, beside Mitsuba: tables and plots in out/bench, 40 minutes
 	$(BIN)/python -m benchmarks.bench
 
 lock:  ## take the newest versions that pyproject.toml allows
