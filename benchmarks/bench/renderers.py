@@ -43,7 +43,7 @@ def drpt(mode: Mode, sampler: str) -> Factory:
         def rendered(spp: int, seed: int) -> Picture:
             from drpt.kernel.launch import learned
 
-            learned.cache_clear()
+            learned.forget()
             result = render(scene, spp, bounces, mode, sampler=sampler, seed=seed)
             return Picture(result.image, result.rays)
 

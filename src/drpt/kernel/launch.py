@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +14,7 @@ from drpt.kernel.coverage import covering_facets
 from drpt.kernel.denormals import flush_denormals
 from drpt.kernel.device_scene import DeviceScene, upload
 from drpt.kernel.estimator import Features
+from drpt.kernel.kept import Kept
 from drpt.kernel.learning import learn
 from drpt.kernel.path import Tracer
 from drpt.kernel.primitives import make_primitives
@@ -192,7 +192,7 @@ def make_launcher(
     return Launcher(tracer, camera, covering, SAMPLERS[sampler], jitter, paths_per_ray, primitives)
 
 
-@lru_cache(maxsize=1)
+@Kept
 def prepare(shapes: tuple[Shape, ...], types: ModuleType) -> tuple[Primitives, DeviceScene]:
     """Primitives of shapes, on the host and on the device: kept for the next render of them."""
     primitives = make_primitives(shapes)
@@ -201,13 +201,13 @@ def prepare(shapes: tuple[Shape, ...], types: ModuleType) -> tuple[Primitives, D
     return primitives, upload(primitives, types)
 
 
-@lru_cache(maxsize=1)
+@Kept
 def learned(shapes: tuple[Shape, ...], types: ModuleType) -> Guide:
     """What is known of shapes with diffuse facets: kept like them."""
     return learn(*prepare(shapes, types))
 
 
-@lru_cache(maxsize=1)
+@Kept
 def covered(camera: Camera, shapes: tuple[Shape, ...], types: ModuleType) -> UInt32:
     """Numbers of the facets that fill pixels: kept for the next render by the same camera."""
     primitives, scene = prepare(shapes, types)
@@ -218,7 +218,7 @@ def covered(camera: Camera, shapes: tuple[Shape, ...], types: ModuleType) -> UIn
 def forget() -> None:
     """Forget all that is kept for the next render."""
     for kept in (prepare, learned, covered):
-        kept.cache_clear()
+        kept.forget()
 
 
 def _seed_word(seed: int) -> int:
