@@ -267,7 +267,7 @@ def _triangles() -> list[AbstractContextManager[Any]]:
 
 
 def _one_by_one() -> list[AbstractContextManager[Any]]:
-    return [patch("drpt.kernel.device_scene.SPHERE_LIMIT", 2 * MANY)]
+    return [patch("drpt.kernel.spheres.SPHERE_LIMIT", 2 * MANY)]
 
 
 def _shadow_rays() -> list[AbstractContextManager[Any]]:

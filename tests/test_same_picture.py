@@ -83,7 +83,7 @@ def test_triangles_in_embree_and_unrolled(mode: str, monkeypatch: pytest.MonkeyP
     plain = drpt.render(small_scene(), SPP, BOUNCES, mode)
     monkeypatch.setattr("drpt.kernel.primitives.FACET_LIMIT", 0)
     monkeypatch.setattr("drpt.kernel.primitives.LIGHT_FACET_LIMIT", 0)
-    monkeypatch.setattr("drpt.kernel.device_scene.SPHERE_LIMIT", 0)
+    monkeypatch.setattr("drpt.kernel.spheres.SPHERE_LIMIT", 0)
     forget()
     assert_same(drpt.render(small_scene(), SPP, BOUNCES, mode), plain)
 

@@ -40,7 +40,12 @@ if TYPE_CHECKING:
 SIDE, SPP = 32, 8
 # Such points are off by 1e-7 of the scene, which grows from bounce to bounce.
 ROUNDING = 2e-4
-ROUNDED = {"bodies as facets", "facets as triangles", "camera rays of covered pixels"}
+ROUNDED = {
+    "bodies as facets",
+    "facets as triangles",
+    "spheres one by one",
+    "camera rays of covered pixels",
+}
 # Paths that share camera rays are other samples: `test_launch` compares their means.
 OTHER_SAMPLES = {"a camera ray for each path"}
 # As many operations or fewer, for more lanes.

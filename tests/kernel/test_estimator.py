@@ -11,7 +11,10 @@ import pytest
 import drpt
 from drpt.kernel.estimator import Features, Mode, feature_facts, layout_facts
 from drpt.kernel.launch import prepare
-from drpt.kernel.primitives import FACET_LIMIT, SPHERE_LIMIT, make_primitives
+from drpt.kernel.primitives import FACET_LIMIT, make_primitives
+from drpt.kernel.sphere_grid import SphereGrid
+from drpt.kernel.sphere_tree import SphereTree
+from drpt.kernel.spheres import SPHERE_LIMIT
 from tests.conftest import TYPES
 
 if TYPE_CHECKING:
@@ -37,6 +40,8 @@ LAYERS = np.concatenate([np.add(CORNERS, (0, 0, z)) for z in range(MANY)])
 STRIPES = drpt.Mesh(LAYERS, np.arange(3 * MANY).reshape(-1, 3), material=DIFFUSE)
 PANELS = drpt.Mesh(LAYERS, STRIPES.faces, radiance=1)
 BALLS = [drpt.Sphere((3 * x, 0, 0), 1, material=DIFFUSE) for x in range(SPHERE_LIMIT + 1)]
+PIT = *BALLS, drpt.Sphere((0, 0, 20), 9, radiance=1)
+HEAPS = [drpt.Sphere((1e4 * (x % 2) + x / 9, 0, 0), 1, DIFFUSE) for x in range(SPHERE_LIMIT + 1)]
 IMPLICIT, EXPLICIT = {"mode": "implicit"}, {"mode": "explicit"}
 GUIDED: dict[str, Any] = {"mode": "guided"}
 ONE_SPHERE = "light samples of one sphere have all of its light on diffuse surfaces"
@@ -237,8 +242,18 @@ def test_every_feature_is_told() -> None:
         ("mesh", (False, "7 facets, not more than 64, or 24 that emit"), [*HOUSE], {}),
         ("mesh", (True, "65 triangles, more than 64, or 24 that emit"), [STRIPES, LAMP], {}),
         ("mesh", (True, "65 triangles, more than 64, or 24 that emit"), [BALL, PANELS], {}),
-        ("sphere_tree", (False, "2 spheres, not more than 64"), [BALL, LAMP], {}),
-        ("sphere_tree", (True, "66 spheres, more than 64"), [*BALLS, LAMP], {}),
+        ("sphere_grid", (False, "2 spheres, not more than 32"), [BALL, LAMP], {}),
+        ("sphere_grid", (True, "34 spheres, more than 32"), [*BALLS, LAMP], {}),
+        ("sphere_grid", (True, "34 spheres, 1 of which stands out, more than 32"), [*PIT], {}),
+        ("sphere_grid", (False, "they are spread unevenly"), [*HEAPS, LAMP], {}),
+        ("sphere_tree", (False, "2 spheres, not more than 32"), [BALL, LAMP], {}),
+        ("sphere_tree", (False, "they are spread evenly"), [*BALLS, LAMP], {}),
+        (
+            "sphere_tree",
+            (True, "34 spheres, more than 32, spread unevenly"),
+            [*HEAPS, LAMP],
+            {},
+        ),
         ("facet_shadows", (True, "1 of 7 facets can stand before a light"), [*HOUSE], {}),
         ("facet_shadows", (False, "0 of 6 facets can stand before a light"), [ROOM, LAMP], {}),
         ("facet_shadows", (False, "mode implicit samples no light"), [*HOUSE], IMPLICIT),
@@ -258,13 +273,23 @@ def test_reasons(
 
 
 @pytest.mark.parametrize(
-    "shapes", [[*HOUSE], [STRIPES, LAMP], [*BALLS, LAMP], [BALL, PANELS], [ROOM, LAMP]]
+    "shapes",
+    [
+        [*HOUSE],
+        [STRIPES, LAMP],
+        [*BALLS, LAMP],
+        [*HEAPS, LAMP],
+        [*PIT],
+        [BALL, PANELS],
+        [ROOM, LAMP],
+    ],
 )
 def test_what_is_told_is_on_the_device(shapes: list[Shape]) -> None:
     told = {name: fact.holds for name, fact in facts(*shapes).items()}
     _, scene = prepare(tuple(shapes), TYPES)
     assert told["mesh"] is (scene.mesh is not None or scene.light_mesh is not None)
-    assert told["sphere_tree"] is (scene.sphere_tree is not None)
+    assert told["sphere_grid"] is isinstance(scene.many_spheres, SphereGrid)
+    assert told["sphere_tree"] is isinstance(scene.many_spheres, SphereTree)
     assert told["solids"] is (len(scene.solids) > 0)
     loose = any(blocks for _, _, blocks in scene.loose_facets)
     assert told["facet_shadows"] is (loose or any(solid.shading for solid in scene.solids))

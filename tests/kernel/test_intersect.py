@@ -14,7 +14,8 @@ from drpt.kernel.camera import Ray
 from drpt.kernel.estimator import Mode
 from drpt.kernel.intersect import closest_hit, occluded
 from drpt.kernel.launch import make_launcher
-from drpt.kernel.primitives import FACET_LIMIT, SPHERE_LIMIT, make_primitives
+from drpt.kernel.primitives import FACET_LIMIT, make_primitives
+from drpt.kernel.spheres import SPHERE_LIMIT
 from tests.conftest import TYPES, to_host
 from tests.oracle import geometry
 from tests.oracle.arrays import dot, normalize, sample_uniform_sphere
@@ -573,7 +574,7 @@ def test_a_large_sphere_is_as_exact_as_what_stands_on_it(radius: float) -> None:
 
 def test_only_a_sphere_near_the_origin_is_large() -> None:
     def balls(*shapes: Shape) -> list[bool]:
-        return [ball.power is not None for ball in World(*shapes).scene.balls]
+        return [ball.power is not None for _, ball in World(*shapes).scene.balls]
 
     light = drpt.Sphere((0, 0, 1), 1, radiance=1)
     assert balls(drpt.Sphere((0, 0, -1e5), 1e5, material=dull(0)), light)[0]

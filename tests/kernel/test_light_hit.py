@@ -12,7 +12,7 @@ import drpt
 from drpt.kernel.camera import Ray
 from drpt.kernel.intersect import closest_hit, light_hit
 from drpt.kernel.launch import make_launcher
-from drpt.kernel.primitives import SPHERE_LIMIT
+from drpt.kernel.spheres import SPHERE_LIMIT
 from tests.conftest import TYPES, to_device
 from tests.oracle.arrays import normalize, sample_uniform_sphere
 from tests.random_scenes import tame_scene

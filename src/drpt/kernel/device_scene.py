@@ -10,9 +10,11 @@ import drjit as dr
 import numpy as np
 
 from drpt.kernel.light_tree import LightTree
+from drpt.kernel.meet import Ball
 from drpt.kernel.mesh import TriangleMesh
-from drpt.kernel.primitives import LUMINANCE, SPHERE_LIMIT
+from drpt.kernel.primitives import LUMINANCE
 from drpt.kernel.solids import edge_owners
+from drpt.kernel.sphere_grid import SphereGrid
 from drpt.kernel.sphere_tree import SphereTree
 from drpt.kernel.vec import gather_row
 
@@ -29,19 +31,6 @@ if TYPE_CHECKING:
 
 LARGE = 1 / 16
 """A sphere is large if the origin is no farther from its surface, relative to its radius."""
-
-
-@dataclass
-class Ball:
-    """A sphere whose centre and radius are inputs of the kernel, the same for all lanes.
-
-    One that is large against its distance from the origin, such as the ground, also has the
-    ``power`` of the origin, |c|² − r²: there the difference would lose all of its digits.
-    """
-
-    center: Array3f
-    radius: Float
-    power: Float | None = None
 
 
 class SurfaceRow(NamedTuple):
@@ -80,8 +69,10 @@ class DeviceScene:
         0 for other facets, None without such.
     light_facets, light_mesh
         The triangles that emit, as facets where they are few, else as a mesh.
-    balls, sphere_tree
-        Each sphere, where they are few; else all of them.
+    balls
+        Of the spheres that are met one by one: number, and what is the same for all lanes.
+    many_spheres
+        The others.
     surfaces
         Rows of 8 by primitive, see `SurfaceRow`.
     smooth
@@ -107,8 +98,8 @@ class DeviceScene:
     reach: Float | None
     light_facets: tuple[Facet, ...]
     light_mesh: TriangleMesh | None
-    balls: tuple[Ball, ...]
-    sphere_tree: SphereTree | None
+    balls: tuple[tuple[int, Ball], ...]
+    many_spheres: SphereGrid | SphereTree | None
     surfaces: Float
     smooth: Float
     lights: Float
@@ -138,7 +129,6 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
     array = partial(to_device, types=types)
     triangles = primitives.triangles
     in_light_mesh = primitives.light_corners[len(primitives.light_facets) :]
-    few_spheres = len(primitives.spheres) <= SPHERE_LIMIT
     first = primitives.first_sphere
     planes, lit_planes = primitives.planes[:first], primitives.planes[first:]
     solids = primitives.solids
@@ -162,8 +152,11 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         reach=array(reach) if reach.any() else None,
         light_facets=primitives.light_facets,
         light_mesh=TriangleMesh(in_light_mesh, types) if len(in_light_mesh) else None,
-        balls=tuple(_ball(row, types) for row in primitives.spheres) if few_spheres else (),
-        sphere_tree=None if few_spheres else SphereTree(primitives.spheres, first, types, array),
+        balls=tuple(
+            (first + i, _ball(primitives.spheres[i], types))
+            for i in primitives.sphere_layout.single.tolist()
+        ),
+        many_spheres=_many_spheres(primitives, types, array),
         surfaces=array(surfaces),
         smooth=array(
             np.concatenate([primitives.smooth_corners, primitives.smooth_normals], axis=1)
@@ -175,6 +168,18 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
         light_count=len(primitives.radiance),
         sphere_lights=primitives.sphere_lights,
     )
+
+
+def _many_spheres(
+    primitives: Primitives, types: ModuleType, upload: Callable[[NDArray[Any]], Any]
+) -> SphereGrid | SphereTree | None:
+    _, many, cells = primitives.sphere_layout
+    spheres, numbers = primitives.spheres[many], primitives.first_sphere + many
+    if not len(many):
+        return None
+    if cells is None:
+        return SphereTree(spheres, numbers, upload)
+    return SphereGrid(cells, spheres, numbers, types, upload)
 
 
 def _light_tree(
@@ -206,16 +211,19 @@ def _reach(primitives: Primitives, loose: list[int]) -> NDArray[np.float64]:
     return np.concatenate([reach, np.abs(primitives.triangles).max(axis=(1, 2), initial=0)])
 
 
-def to_device(values: NDArray[np.float64], types: ModuleType) -> Float:
+def to_device(values: NDArray[Any], types: ModuleType) -> Any:
     """Numbers on the device, one row after the other, in memory of Dr.Jit's own.
 
-    Rows are gathered in one piece from aligned memory only, and element by element from other:
-    where NumPy's memory happens to lie would decide which kernel is compiled.
+    They are of 32 bits there: unsigned if they are so on the host, else floating-point. Rows are
+    gathered in one piece from aligned memory only, and element by element from other: where NumPy's
+    memory happens to lie would decide which kernel is compiled.
     """
-    mapped = types.Float32(values.astype(np.float32).ravel())
+    words = values.dtype == np.uint32
+    kind = types.UInt32 if words else types.Float32
+    mapped = kind((values if words else values.astype(np.float32)).ravel())
     if not len(mapped):
         return mapped
-    copy = mapped * dr.opaque(types.Float32, 1)
+    copy = mapped * dr.opaque(kind, 1)
     dr.eval(copy)
     return copy
 

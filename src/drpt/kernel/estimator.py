@@ -6,7 +6,8 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from drpt.kernel.primitives import FACET_LIMIT, LIGHT_FACET_LIMIT, SPHERE_LIMIT
+from drpt.kernel.primitives import FACET_LIMIT, LIGHT_FACET_LIMIT
+from drpt.kernel.spheres import SPHERE_LIMIT
 
 if TYPE_CHECKING:
     from drpt.kernel.primitives import Primitives
@@ -133,7 +134,7 @@ def layout_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, 
         Coplanar triangles as one facet.
     ``solids``
         Convex bodies, each met as a whole.
-    ``mesh``, ``sphere_tree``
+    ``mesh``, ``sphere_grid``, ``sphere_tree``
         Hierarchies of triangles and of spheres, which else are met one by one.
     ``facet_shadows``
         Facets that shadow rays look for.
@@ -232,7 +233,7 @@ def _facet_facts(primitives: Primitives) -> dict[str, Fact]:
 
 
 def _hierarchy_facts(primitives: Primitives) -> dict[str, Fact]:
-    lit, spheres = _lit(primitives), len(primitives.spheres)
+    lit = _lit(primitives)
     facets, emitting = len(primitives.facets), len(primitives.light_facets)
     triangles = len(primitives.planes) - facets - emitting
     limits = f"{FACET_LIMIT}, or {LIGHT_FACET_LIMIT} that emit"
@@ -242,10 +243,23 @@ def _hierarchy_facts(primitives: Primitives) -> dict[str, Fact]:
             *lit,
             (triangles > 0, f"{_number(facets + emitting, 'facet')}, not more than {limits}"),
         ),
+        **_sphere_facts(primitives),
+    }
+
+
+def _sphere_facts(primitives: Primitives) -> dict[str, Fact]:
+    spheres, (single, many, cells) = len(primitives.spheres), primitives.sphere_layout
+    verb = "stands" if len(single) == 1 else "stand"
+    alone = f", {len(single)} of which {verb} out" if len(single) else ""
+    needs = (
+        *_lit(primitives),
+        (len(many) > 0, f"{_number(spheres, 'sphere')}, not more than {SPHERE_LIMIT}"),
+    )
+    told = f"{spheres} spheres{alone}, more than {SPHERE_LIMIT}"
+    return {
+        "sphere_grid": _decide(told, *needs, (cells is not None, "they are spread unevenly")),
         "sphere_tree": _decide(
-            f"{spheres} spheres, more than {SPHERE_LIMIT}",
-            *lit,
-            (spheres > SPHERE_LIMIT, f"{_number(spheres, 'sphere')}, not more than {SPHERE_LIMIT}"),
+            f"{told}, spread unevenly", *needs, (cells is None, "they are spread evenly")
         ),
     }
 

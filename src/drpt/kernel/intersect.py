@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import drjit as dr
 
-from drpt.kernel.device_scene import Ball, SurfaceRow
+from drpt.kernel.device_scene import SurfaceRow
 from drpt.kernel.meet import (
     dot_constant,
     meet_facet,
@@ -25,7 +25,11 @@ if TYPE_CHECKING:
     from drpt.kernel.camera import Ray
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
+    from drpt.kernel.meet import Ball
+    from drpt.kernel.sphere_grid import SphereGrid
     from drpt.kernel.sphere_tree import SphereTree
+
+    ManySpheres: TypeAlias = SphereGrid | SphereTree
 
 SPAWN_OFFSET = 2.0**-20
 """How far off its surface a ray starts, relative to the coordinates there: 16 half ulps.
@@ -95,10 +99,12 @@ def _nearest(scene: DeviceScene, ray: Ray, active: Bool) -> tuple[Float, UInt32]
         closer = met & (t < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
-    for number, met, t in _surfaces_and_spheres(scene, ray, active):
+    for number, met, t in _surfaces_and_balls(scene, ray, active):
         closer = met & (t <= nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
+    if scene.many_spheres is not None:
+        nearest, primitive = _or_of_many(scene.many_spheres, ray, active, nearest, primitive)
     return _or_light_triangle(scene, ray, active, nearest, primitive)
 
 
@@ -126,11 +132,11 @@ def light_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) ->
 
     Few lights are looked for first, and where there is one, what stands before it.
     """
-    if scene.sphere_tree is not None or scene.light_mesh is not None:
+    if scene.many_spheres is not None or scene.light_mesh is not None:
         hit = closest_hit(scene, features, ray, active)
         return hit._replace(valid=hit.valid & (hit.primitive >= scene.first_light))
     nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(scene.first_light)
-    for number, ball in enumerate(scene.balls, start=scene.first_sphere):
+    for number, ball in scene.balls:
         if number >= scene.first_light:
             met, t = meet_sphere(ray, ball)
             closer = met & (t <= nearest)
@@ -163,17 +169,18 @@ def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, activ
     blocked = scene.types.Bool(False)
     if scene.mesh is not None:
         blocked = scene.mesh.blocks(ray, before, active)
-    if scene.sphere_tree is not None:
-        blocked |= _many_block(scene.sphere_tree, ray, active, target, before, beyond)
     for solid in scene.solids:
         if solid.shading:
             blocked |= solid_blocks(ray, solid, before)
-    for number, met, t in _surfaces_and_spheres(scene, ray, active, target):
+    for number, met, t in _surfaces_and_balls(scene, ray, active, target):
         reflects = isinstance(number, int) and number < scene.first_light
         reach = before if reflects else dr.select(number > target, beyond, before)
         blocked |= met & (t < reach)
     for number, met, t, front in _light_triangles(scene, ray, active, target):
         blocked |= met & (t < dr.select(front & (number > target), beyond, before))
+    if scene.many_spheres is not None:
+        open_ = active & ~blocked
+        blocked |= _many_block(scene.many_spheres, ray, open_, target, before, beyond)
     return blocked
 
 
@@ -181,59 +188,55 @@ def _slack(ray: Ray, t: Float) -> Float:
     return COINCIDENT * (t + largest(ray.origin))
 
 
-def _surfaces_and_spheres(
+def _surfaces_and_balls(
     scene: DeviceScene, ray: Ray, active: Bool, target: UInt32 | None = None
 ) -> Iterator[tuple[Any, Bool, Float]]:
     """What a ray may meet first: a primitive's number, whether it is met beyond 0, and where.
 
     For shadow rays, ``target`` is the number of the light that they lead to, which casts none; a
-    mesh and many spheres are asked about those as a whole.
+    mesh is asked about those as a whole.
     """
     if scene.mesh is not None and target is None:
         yield scene.mesh.closest(ray, active)
     for number, facet, blocks in scene.loose_facets:
         if blocks or target is None:
             yield number, *meet_facet(ray, facet)
-    for number, ball in enumerate(scene.balls, start=scene.first_sphere):
+    for number, ball in scene.balls:
         met, t = meet_sphere(ray, ball)
         is_light = number >= scene.first_light
         yield number, met & (target != number) if is_light and target is not None else met, t
-    if scene.sphere_tree is not None and target is None:
-        yield _closest_of_many(scene.sphere_tree, ray, active)
 
 
-def _closest_of_many(tree: SphereTree, ray: Ray, active: Bool) -> tuple[UInt32, Bool, Float]:
-    """The first of many spheres; of coincident ones, the last."""
+def _or_of_many(
+    many: ManySpheres, ray: Ray, active: Bool, nearest: Float, primitive: UInt32
+) -> tuple[Float, UInt32]:
+    """The distance and number of a sphere that is nearer than what has been found, if any.
+
+    Of coincident ones, the last.
+    """
 
     def visit(
-        row: Array4f, number: UInt32, is_leaf: Bool, end: Float, found: UInt32
+        number: UInt32, met: Bool, t: Float, end: Float, found: UInt32
     ) -> tuple[Float, UInt32]:
-        met, t = meet_sphere(ray, _ball_of(row))
-        closer = is_leaf & met & ((t < end) | ((t == end) & (number > found)))
+        closer = met & ((t < end) | ((t == end) & (number > found)))
         return dr.select(closer, t, end), dr.select(closer, number, found)
 
-    t, number = tree.walk(ray, active, types_of(ray.origin.x).Float32(dr.inf), visit)
-    return number, t < dr.inf, t
+    return many.walk(ray, active, nearest, primitive, visit)
 
 
 def _many_block(
-    tree: SphereTree, ray: Ray, active: Bool, target: UInt32, before: Float, beyond: Float
+    many: ManySpheres, ray: Ray, active: Bool, target: UInt32, before: Float, beyond: Float
 ) -> Bool:
     """Whether any of many spheres does; the walk ends at the first one."""
 
     def visit(
-        row: Array4f, number: UInt32, is_leaf: Bool, end: Float, found: UInt32
+        number: UInt32, met: Bool, t: Float, end: Float, found: UInt32
     ) -> tuple[Float, UInt32]:
-        met, t = meet_sphere(ray, _ball_of(row))
         reach = dr.select(number > target, beyond, before)
-        blocks = is_leaf & met & (number != target) & (t < reach)
+        blocks = met & (number != target) & (t < reach)
         return dr.select(blocks, -1, end), found
 
-    return tree.walk(ray, active, beyond, visit)[0] < 0
-
-
-def _ball_of(row: Array4f) -> Ball:
-    return Ball(vec3(row[0], row[1], row[2]), row[3])
+    return many.walk(ray, active, beyond, types_of(target).UInt32(0), visit)[0] < 0
 
 
 def _light_triangles(
@@ -308,7 +311,7 @@ def _on_primitive(
         return _on_facet(row, p)
     reflect = _some_spheres_reflect(scene, features)
     on_sphere = _on_sphere(row, p, ray) if reflect else _on_sphere_light(row, p)
-    for number, ball in enumerate(scene.balls, start=scene.first_sphere):
+    for number, ball in scene.balls:
         if ball.power is not None:
             on_ball = _on_large_sphere(ball, ball.power, p)
             on_sphere = dr.select(primitive == number, on_ball, on_sphere)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from drjit.auto import Array3f, Bool, Float, UInt32
 
     from drpt.kernel.camera import Ray
-    from drpt.kernel.device_scene import Ball
     from drpt.kernel.facets import Facet
     from drpt.kernel.solids import Face, Solid, Span
 
@@ -22,6 +22,19 @@ SKIN = 2.0**-21
 Rounding may put a point in a corner of a room beyond the other wall; what has been stepped off the
 outside of a face, by `SPAWN_OFFSET`, is twice as far away.
 """
+
+
+@dataclass
+class Ball:
+    """A sphere: its centre and radius.
+
+    One that is large against its distance from the origin, such as the ground, also has the
+    ``power`` of the origin, |c|² − r²: there the difference would lose all of its digits.
+    """
+
+    center: Array3f
+    radius: Float
+    power: Float | None = None
 
 
 def meet_solid(ray: Ray, solid: Solid) -> tuple[UInt32, Bool, Float]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from drpt.kernel.facets import COPLANAR, bounds, has_area, make_facet, merge_coplanar
 from drpt.kernel.solids import make_solids
+from drpt.kernel.spheres import SphereLayout, lay_out
 from drpt.scene import Diffuse, Mesh, Phong, Sphere
 
 if TYPE_CHECKING:
@@ -34,8 +35,6 @@ Embree is as fast as 110, but kernels of so many take seconds to compile.
 """
 LIGHT_FACET_LIMIT = 24
 """Likewise of those that emit, where Embree is as fast."""
-SPHERE_LIMIT = 64
-"""Likewise of spheres, where a tree is as fast."""
 MERGE_LIMIT = 4 * FACET_LIMIT
 """Meshes of more triangles than this are not searched for coplanar neighbours."""
 DIFFUSE = -1.0
@@ -130,6 +129,11 @@ class Primitives:
     def solids(self) -> tuple[Solid, ...]:
         """The convex bodies among the facets."""
         return make_solids([facet.corners for facet in self.facets], *self._balls())
+
+    @cached_property
+    def sphere_layout(self) -> SphereLayout:
+        """How the spheres are met, numbered from 0 on."""
+        return lay_out(self.spheres)
 
     @cached_property
     def interior(self) -> bool:
@@ -299,17 +303,13 @@ def _origin(shapes: tuple[Shape, ...]) -> Array:
 
     Relative to it, float32 resolves the shapes however far they stand from the scene's own origin.
     """
-    low = np.min([_box(shape)[0] for shape in shapes], axis=0)
-    high = np.max([_box(shape)[1] for shape in shapes], axis=0)
+    spheres = [(*shape.center, shape.radius) for shape in shapes if isinstance(shape, Sphere)]
+    centers, radii = np.split(np.array(spheres).reshape(-1, 4), [3], axis=1)
+    meshes = [shape.vertices for shape in shapes if isinstance(shape, Mesh)]
+    low = np.vstack([centers - radii, *(mesh.min(axis=0) for mesh in meshes)]).min(axis=0)
+    high = np.vstack([centers + radii, *(mesh.max(axis=0) for mesh in meshes)]).max(axis=0)
     extent = np.linalg.norm(high - low)
     if extent == 0:
         return np.asarray(low)
     grid = 2.0 ** np.ceil(np.log2(extent))
     return np.asarray(grid * np.round((low + high) / 2 / grid))
-
-
-def _box(shape: Shape) -> tuple[Array, Array]:
-    if isinstance(shape, Sphere):
-        center = np.array(shape.center)
-        return center - shape.radius, center + shape.radius
-    return shape.vertices.min(axis=0), shape.vertices.max(axis=0)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
+from drpt.kernel.meet import Ball, meet_sphere
 from drpt.kernel.vec import gather_row, greater, lesser, types_of, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import ModuleType
 
     from drjit.auto import Array3f, Bool, Float, UInt32
     from numpy.typing import NDArray
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from drpt.kernel.camera import Ray
 
     Array = NDArray[np.float64]
+    Visit = Callable[[UInt32, Bool, Float, Float, UInt32], tuple[Float, UInt32]]
 
 WIDTH = 16
 """Numbers in the row of a node: the boxes of its children, or a sphere and its own number.
@@ -66,29 +67,29 @@ def boxes_around(spheres: Array) -> Array:
 
 
 class SphereTree:
-    """Spheres (n, 4) as centres and radii, numbered from ``first`` on.
+    """Spheres (n, 4) as centres and radii, numbered by ``numbers`` (n,).
 
     ``upload`` brings numbers to the device, to memory from which rows are gathered in one piece.
     """
 
     def __init__(
-        self, spheres: Array, first: int, types: ModuleType, upload: Callable[[Array], Float]
+        self, spheres: Array, numbers: NDArray[np.intp], upload: Callable[[Array], Float]
     ) -> None:
         self._leaves = 2 ** (len(spheres) - 1).bit_length()
-        padded = np.full((self._leaves, 4), np.nan)
-        padded[: len(spheres)] = spheres
-        order = arrange(padded[:, :3])
-        inner = boxes_around(padded[order]).reshape(-1, 12)
-        leaves = np.column_stack([padded[order], first + order])
+        padded = np.full((self._leaves, 5), np.nan)
+        padded[: len(spheres)] = np.column_stack([spheres, numbers])
+        leaves = padded[arrange(padded[:, :3])]
+        inner = boxes_around(leaves[:, :4]).reshape(-1, 12)
         self._rows = upload(np.concatenate([_widened(inner), _widened(leaves)]))
 
     def walk(
-        self, ray: Ray, active: Bool, end: Float, visit: Callable[..., tuple[Float, UInt32]]
+        self, ray: Ray, active: Bool, end: Float, found: UInt32, visit: Visit
     ) -> tuple[Float, UInt32]:
         """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
 
-        ``visit(row, number, is_leaf, end, found)`` gets a sphere, and what an earlier visit has
-        returned; the walk is over where the end is before the origin.
+        ``visit(number, met, t, end, found)`` gets a sphere's number, whether and where the ray
+        meets it, and what an earlier visit has returned; the walk is over where the end is before
+        the origin.
         """
         types = types_of(end)
         inverse = dr.rcp(ray.direction)
@@ -98,7 +99,8 @@ class SphereTree:
         ) -> tuple[UInt32, UInt32, Float, UInt32]:
             is_leaf = node >= self._leaves
             row = gather_row(self._rows, node, WIDTH)
-            end, found = visit(types.Array4f(row[:4]), types.UInt32(row[4]), is_leaf, end, found)
+            met, t = meet_sphere(ray, Ball(vec3(*row[:3]), row[3]))
+            end, found = visit(types.UInt32(row[4]), is_leaf & met, t, end, found)
             left = _meets_box(ray.origin, inverse, end, vec3(*row[0:3]), vec3(*row[3:6]))
             right = _meets_box(ray.origin, inverse, end, vec3(*row[6:9]), vec3(*row[9:12]))
             nearer = dr.select(right < left, 1, 0)
@@ -111,7 +113,7 @@ class SphereTree:
             return node, trail, end, found
 
         # The bit of a level tells in the trail whether the other child there is still to be seen.
-        state = (types.UInt32(1), types.UInt32(0), end, types.UInt32(0))
+        state = (types.UInt32(1), types.UInt32(0), end, found)
         goes_on = lambda node, _, end, __: active & (node > 0) & (end > 0)  # noqa: E731
         _, _, end, found = dr.while_loop(state, goes_on, step)
         return end, found

@@ -41,12 +41,13 @@ def largest(v: Array3f) -> Float:
     return greater(greater(dr.abs(v.x), dr.abs(v.y)), dr.abs(v.z))
 
 
-def gather_row(table: Float, row: UInt32, width: int, active: Any = True) -> list[Float]:
+def gather_row(table: Any, row: UInt32, width: int, active: Any = True) -> list[Any]:
     """The numbers of a row of a table, in one piece, where ``width`` is a power of two.
 
     A gather is a call in the kernel, which moves all that is in registers out of the way.
     """
-    kind = types_of(table).ArrayXf
+    types = types_of(table)
+    kind = types.ArrayXf if isinstance(table, types.Float32) else types.ArrayXu
     return list(dr.gather(kind, table, row, active, shape=(width, len(row))))
 
 

@@ -1,0 +1,125 @@
+"""Cells of a grid, in which spheres lie (host)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Ints = NDArray[np.intp]
+
+DENSITY = 0.7
+"""Spheres for each cell, about: with fewer there are more cells to cross, with more, to look at."""
+LONGEST = 512
+"""Cells along an axis at the most."""
+SHARES = 8
+"""Cells that a sphere lies in at the most, on average."""
+ROOM = 2.0**-14
+"""By which spheres are larger for their cells, relative to the grid.
+
+That is twice what a ray's distances to cells' sides are off, as sums of up to `LONGEST` terms.
+"""
+LINKS = 2**24
+"""Rows that a word has room to tell apart, beside an exponent."""
+_EXPONENT_OF_1, _EXPONENT_OF_INFINITY = 127, 255
+"""As the bits of a floating-point number of 32 bits tell them."""
+
+
+class Cells(NamedTuple):
+    """A box between two corners (3,), cut into ``counts`` (3,) cells; in which of them spheres lie.
+
+    There is one more cell on each side, which is empty. ``cell`` and ``sphere`` are the numbers of
+    each pair (n,) of a cell and a sphere in it, in the order of the cells.
+    """
+
+    low: Array
+    high: Array
+    counts: Ints
+    cell: Ints
+    sphere: Ints
+
+    @property
+    def width(self) -> Array:
+        """Of a cell along each axis, (3,)."""
+        return np.asarray((self.high - self.low) / self.counts)
+
+    @property
+    def strides(self) -> Ints:
+        """By how much numbers of neighbours along each axis differ, (3,)."""
+        return _strides(self.counts)
+
+    @property
+    def total(self) -> int:
+        """How many cells there are, those on the sides included."""
+        return int((self.counts + 2).prod())
+
+    @property
+    def crowd(self) -> float:
+        """How many spheres lie in a cell where a sphere lies, on average."""
+        numbers = np.bincount(self.cell)
+        return float(np.square(numbers).sum() / numbers.sum())
+
+
+def cut(spheres: Array) -> Cells | None:
+    """Cells for spheres (n, 4), or none where too many of the spheres lie in many of them."""
+    centers, radii = spheres[:, :3], spheres[:, 3:]
+    low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
+    room = ROOM * (high - low).max()
+    low, high = low - 2 * room, high + 2 * room
+    counts = _counts(high - low, len(spheres) / DENSITY)
+    width = (high - low) / counts
+    first = np.floor((centers - radii - room - low) / width).astype(np.intp)
+    last = np.floor((centers + radii + room - low) / width).astype(np.intp)
+    sizes = last - first + 1
+    shares = sizes.prod(axis=1)
+    if shares.sum() > SHARES * len(spheres) or (counts + 2).prod() + shares.sum() > LINKS:
+        return None
+    sphere = np.repeat(np.arange(len(spheres)), shares)
+    number = np.arange(len(sphere)) - np.repeat(np.cumsum(shares) - shares, shares)
+    x, y, _ = sizes[sphere].T
+    offsets = np.column_stack([number % x, number // x % y, number // (x * y)])
+    cell = (first[sphere] + offsets + 1) @ _strides(counts)
+    order = np.argsort(cell, kind="stable")
+    return Cells(low, high, counts, cell[order], sphere[order])
+
+
+def _counts(extent: Array, cells: float) -> Ints:
+    """So many cells along each axis that they are about cubes, and about so many in all."""
+    width = (extent.prod() / cells) ** (1 / 3)
+    return np.clip(np.round(extent / width), 1, LONGEST).astype(np.intp)
+
+
+def _strides(counts: Ints) -> Ints:
+    return np.array([1, counts[0] + 2, (counts[0] + 2) * (counts[1] + 2)])
+
+
+class Rows(NamedTuple):
+    """What a grid has at hand of the spheres in its cells.
+
+    ``words`` (n, 4) are the bits of a sphere's centre, and a word: the exponent of a power of two
+    that r² is below, and the number of the row where there is another one in the same cell, or 0.
+    Those of cells that have no sphere are 0. ``spheres`` (n,) are their numbers.
+    """
+
+    words: NDArray[np.uint32]
+    spheres: NDArray[np.uint32]
+
+
+def rows_of(cells: Cells, spheres: Array) -> Rows:
+    """Rows of all cells, each with the first sphere in it, then those of the other ones."""
+    first = np.diff(cells.cell, prepend=-1) > 0
+    others = len(first) - first.sum()
+    words = np.zeros((cells.total + others, 4), np.uint32)
+    numbers = np.zeros(len(words), np.uint32)
+    row = cells.cell.copy()
+    row[~first] = cells.total + np.arange(others)
+    link = np.append(np.where(first[1:], 0, row[1:]), 0)
+    _, exponent = np.frexp(np.square(spheres[cells.sphere, 3]) * (1 + ROOM))
+    words[row, :3] = np.float32(spheres[cells.sphere, :3]).view(np.uint32)
+    words[row, 3] = np.clip(exponent + _EXPONENT_OF_1, 1, _EXPONENT_OF_INFINITY) * LINKS + link
+    numbers[row] = cells.sphere
+    return Rows(words, numbers)
