@@ -59,7 +59,8 @@ def test_cells_are_cubes_as_many_as_spheres() -> None:
 def test_rows_of_a_cell_are_linked() -> None:
     spheres = scattered(300, 0.2)
     cells = cells_of(spheres)
-    rows = rows_of(cells, spheres)
+    marks = np.arange(300) * 55_000 % LINKS
+    rows = rows_of(cells, spheres, marks)
     for cell in range(cells.total):
         expected = cells.sphere[cells.cell == cell].tolist()
         if not expected:
@@ -69,21 +70,27 @@ def test_rows_of_a_cell_are_linked() -> None:
         row = cell
         while row or not found:
             found.append(int(rows.spheres[row]))
-            center = rows.words[row, :3].view(np.float32)
-            assert (center == np.float32(spheres[found[-1], :3])).all()
+            x, y, z = rows.words[row, :3].tolist()
+            assert x % 256 + y % 256 * 256 + z % 256 * 256**2 == marks[found[-1]]
             row = int(rows.words[row, 3]) % LINKS
         assert found == expected
 
 
+@pytest.mark.parametrize("around", [0, 1, 500])
 @pytest.mark.parametrize("radius", [1e-30, 1e-19, 0.001, 0.5, 1, 2**0.5, 2, 3, 1e18])
-def test_words_are_powers_of_two_above_squared_radii(radius: float) -> None:
+def test_spheres_lie_in_balls_around_their_marked_centers(radius: float, around: float) -> None:
     spheres = scattered(40, 1) * (radius, radius, radius, radius / 10)
-    rows = rows_of(cells_of(spheres), spheres)
+    spheres[:, :3] += around * radius
+    rows = rows_of(cells_of(spheres), spheres, np.full(40, LINKS - 1))
     used = rows.words[:, 3] > 0
+    centers = rows.words[used, :3].copy().view(np.float32).astype(float)
     above = (rows.words[used, 3] // LINKS * 2**23).view(np.float32).astype(float)
-    r2 = np.square(np.float32(spheres[rows.spheres[used], 3]).astype(float))
-    assert (above >= r2).all()
-    assert (above <= np.maximum(2.01 * r2, 2.0**-126)).all()
+    sphere = spheres[rows.spheres[used]]
+    moved = np.linalg.norm(centers - sphere[:, :3], axis=1)
+    assert (moved > 0).all()
+    assert (above >= np.square(moved + sphere[:, 3])).all()
+    reach = sphere[:, 3] + 2.0**-15 * np.linalg.norm(sphere[:, :3], axis=1)
+    assert (above <= np.maximum(2.01 * np.square(reach), 2.0**-126)).all()
 
 
 def test_spheres_that_all_lie_in_each_other_have_no_cells() -> None:
@@ -91,6 +98,14 @@ def test_spheres_that_all_lie_in_each_other_have_no_cells() -> None:
     spheres[:, 3] += 1
     assert cut(spheres) is None
     assert SHARES < 1000
+
+
+@pytest.mark.parametrize("side", [1, 1e-20])
+def test_spheres_that_are_far_for_their_size_have_no_cells(side: float) -> None:
+    spheres = scattered(100, 0.1 * side, (side, side, side))
+    assert cut(spheres) is not None
+    spheres[:, 0] += 1e4 * side
+    assert cut(spheres) is None
 
 
 def test_an_axis_has_so_many_cells_at_the_most() -> None:

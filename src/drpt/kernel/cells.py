@@ -23,8 +23,12 @@ ROOM = 2.0**-14
 
 That is twice what a ray's distances to cells' sides are off, as sums of up to `LONGEST` terms.
 """
+FAR = 2.0**10
+"""How far from the origin spheres are at the most, relative to the grid: `ROOM` above rounding."""
 LINKS = 2**24
-"""Rows that a word has room to tell apart, beside an exponent."""
+"""Rows that a word has room to tell apart, beside an exponent; and spheres that marks tell."""
+DIGIT_BITS = 8
+"""Of each coordinate in a row, for a digit of the sphere's mark: 24 in all three."""
 _EXPONENT_OF_1, _EXPONENT_OF_INFINITY = 127, 255
 """As the bits of a floating-point number of 32 bits tell them."""
 
@@ -65,10 +69,13 @@ class Cells(NamedTuple):
 
 
 def cut(spheres: Array) -> Cells | None:
-    """Cells for spheres (n, 4), or none where too many of the spheres lie in many of them."""
+    """Cells for spheres (n, 4); none where they are far, or too many of them lie in many cells."""
     centers, radii = spheres[:, :3], spheres[:, 3:]
     low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
-    room = ROOM * (high - low).max()
+    longest = (high - low).max()
+    if np.abs(centers).max() > FAR * longest:
+        return None
+    room = ROOM * longest
     low, high = low - 2 * room, high + 2 * room
     counts = _counts(high - low, len(spheres) / DENSITY)
     width = (high - low) / counts
@@ -100,17 +107,21 @@ def _strides(counts: Ints) -> Ints:
 class Rows(NamedTuple):
     """What a grid has at hand of the spheres in its cells.
 
-    ``words`` (n, 4) are the bits of a sphere's centre, and a word: the exponent of a power of two
-    that r² is below, and the number of the row where there is another one in the same cell, or 0.
-    Those of cells that have no sphere are 0. ``spheres`` (n,) are their numbers.
+    ``words`` (n, 4) are the bits of a sphere's centre, the last of each coordinate a digit of its
+    mark, and a word: the exponent of a power of two that is above the square of the radius around
+    there, and the number of the row where there is another one in the same cell, or 0. Those of
+    cells that have no sphere are 0. ``spheres`` (n,) are their numbers.
     """
 
     words: NDArray[np.uint32]
     spheres: NDArray[np.uint32]
 
 
-def rows_of(cells: Cells, spheres: Array) -> Rows:
-    """Rows of all cells, each with the first sphere in it, then those of the other ones."""
+def rows_of(cells: Cells, spheres: Array, marks: Ints) -> Rows:
+    """Rows of all cells, each with the first sphere in it, then those of the other ones.
+
+    A sphere is known by its mark (n,), a number below `LINKS`.
+    """
     first = np.diff(cells.cell, prepend=-1) > 0
     others = len(first) - first.sum()
     words = np.zeros((cells.total + others, 4), np.uint32)
@@ -118,8 +129,19 @@ def rows_of(cells: Cells, spheres: Array) -> Rows:
     row = cells.cell.copy()
     row[~first] = cells.total + np.arange(others)
     link = np.append(np.where(first[1:], 0, row[1:]), 0)
-    _, exponent = np.frexp(np.square(spheres[cells.sphere, 3]) * (1 + ROOM))
-    words[row, :3] = np.float32(spheres[cells.sphere, :3]).view(np.uint32)
-    words[row, 3] = np.clip(exponent + _EXPONENT_OF_1, 1, _EXPONENT_OF_INFINITY) * LINKS + link
+    centers, exponents = _marked(spheres, marks)
+    words[row, :3] = centers[cells.sphere]
+    words[row, 3] = exponents[cells.sphere] * LINKS + link
     numbers[row] = cells.sphere
     return Rows(words, numbers)
+
+
+def _marked(spheres: Array, marks: Ints) -> tuple[NDArray[np.uint32], Ints]:
+    """Bits of marked centres (n, 3), and exponents (n,) of powers of two above radii squared."""
+    centers, radii = spheres[:, :3], spheres[:, 3]
+    bits = np.float32(centers).view(np.uint32)
+    digits = marks[:, None] >> DIGIT_BITS * np.arange(3)
+    bits ^= ((bits ^ digits) % 2**DIGIT_BITS).astype(np.uint32)
+    moved = 2.0 ** (DIGIT_BITS - 23) * np.linalg.norm(centers, axis=1)
+    _, exponents = np.frexp(np.square(radii + moved) * (1 + ROOM))
+    return bits, np.clip(exponents + _EXPONENT_OF_1, 1, _EXPONENT_OF_INFINITY)

@@ -233,10 +233,9 @@ def _many_block(
         number: UInt32, met: Bool, t: Float, end: Float, found: UInt32
     ) -> tuple[Float, UInt32]:
         reach = dr.select(number > target, beyond, before)
-        blocks = met & (number != target) & (t < reach)
-        return dr.select(blocks, -1, end), found
+        return dr.select(met & (t < reach), -1, end), found
 
-    return many.walk(ray, active, beyond, types_of(target).UInt32(0), visit)[0] < 0
+    return many.walk(ray, active, beyond, types_of(target).UInt32(0), visit, but=target)[0] < 0
 
 
 def _light_triangles(

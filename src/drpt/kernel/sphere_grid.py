@@ -11,7 +11,7 @@ import drjit as dr
 import numpy as np
 
 from drpt.kernel.camera import Ray
-from drpt.kernel.cells import LINKS, rows_of
+from drpt.kernel.cells import DIGIT_BITS, LINKS, rows_of
 from drpt.kernel.meet import Ball, meet_sphere
 from drpt.kernel.vec import gather_row, greater, lesser, types_of, vec3
 
@@ -59,8 +59,9 @@ class SphereGrid:
         types: ModuleType,
         upload: Callable[[NDArray[Any]], Any],
     ) -> None:
-        rows = rows_of(cells, spheres)
+        rows = rows_of(cells, spheres, numbers - numbers[0])
         self._words = upload(rows.words)
+        self._first = int(numbers[0])
         self._numbers = upload(numbers[rows.spheres].astype(np.uint32))
         self._spheres = upload(spheres[rows.spheres])
         self._low, self._high, self._width, self._per_width = (
@@ -73,14 +74,22 @@ class SphereGrid:
         )
 
     def walk(
-        self, ray: Ray, active: Bool, end: Float, found: UInt32, visit: Visit
+        self,
+        ray: Ray,
+        active: Bool,
+        end: Float,
+        found: UInt32,
+        visit: Visit,
+        but: UInt32 | None = None,
     ) -> tuple[Float, UInt32]:
         """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
 
         ``visit(number, met, t, end, found)`` gets a sphere's number, whether and where the ray
         meets it, and what an earlier visit has returned; the walk is over where the end is before
-        the origin. Distances are measured from where the ray enters the grid, so that from afar the
-        cells are where the spheres are.
+        the origin. The sphere with the number ``but`` is not visited.
+
+        Distances are measured from where the ray enters the grid, so that from afar the cells are
+        where the spheres are.
         """
         types = types_of(end)
         near, far = self._span(ray)
@@ -89,10 +98,11 @@ class SphereGrid:
         ray = Ray(dr.fma(ray.direction, start, ray.origin), ray.direction)
         _, leaves = self._span(ray)
         cell, sides, widths, strides = self._enter(ray)
+        digits = None if but is None else self._digits(but)
 
         def step(*state: Any) -> tuple[Any, ...]:
             walk = _Walk(*state)
-            close, link = self._look(walk.row, ray)
+            close, link = self._look(walk.row, ray, digits)
 
             def meet(end: Float, found: UInt32) -> tuple[Float, UInt32]:
                 sphere = gather_row(self._spheres, walk.row, 4, close)
@@ -149,13 +159,24 @@ class SphereGrid:
         cell = dr.dot(types.Array3u(place) + 1, self._strides)
         return cell, away, dr.abs(self._width * inverse), strides
 
-    def _look(self, row: UInt32, ray: Ray) -> tuple[Bool, UInt32]:
-        """Whether a row's sphere is close to the line of a ray, and the next row of the cell."""
+    def _digits(self, number: UInt32) -> Array3u:
+        """What the coordinates of a sphere end with in its rows; of none, if it is not in there."""
+        mark = dr.minimum(number - self._first, LINKS - 1)
+        return types_of(number).Array3u(mark, mark >> DIGIT_BITS, mark >> 2 * DIGIT_BITS)
+
+    def _look(self, row: UInt32, ray: Ray, but: Array3u | None) -> tuple[Bool, UInt32]:
+        """Whether a row's sphere is close to the line of a ray, and the next row of the cell.
+
+        Spheres whose coordinates end with the digits ``but`` are not.
+        """
         types = types_of(ray.origin.x)
-        *center, word = gather_row(self._words, row, 4)
-        bits = (*center, (word >> 1) & _EXPONENT)
+        x, y, z, word = gather_row(self._words, row, 4)
+        bits = (x, y, z, (word >> 1) & _EXPONENT)
         numbers: Any = [dr.reinterpret_array(types.Float32, number) for number in bits]
-        x, y, z, r2 = numbers
-        spoke = ray.origin - vec3(x, y, z)
+        spoke = ray.origin - vec3(*numbers[:3])
         aside = dr.fma(ray.direction, -dr.dot(spoke, ray.direction), spoke)
-        return dr.squared_norm(aside) < r2, word & (LINKS - 1)
+        close = dr.squared_norm(aside) < numbers[3]
+        if but is not None:
+            differ = (x ^ but.x) | (y ^ but.y) | (z ^ but.z)
+            close &= (differ & (2**DIGIT_BITS - 1)) != 0
+        return close, word & (LINKS - 1)

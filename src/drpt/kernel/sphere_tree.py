@@ -83,13 +83,19 @@ class SphereTree:
         self._rows = upload(np.concatenate([_widened(inner), _widened(leaves)]))
 
     def walk(
-        self, ray: Ray, active: Bool, end: Float, found: UInt32, visit: Visit
+        self,
+        ray: Ray,
+        active: Bool,
+        end: Float,
+        found: UInt32,
+        visit: Visit,
+        but: UInt32 | None = None,
     ) -> tuple[Float, UInt32]:
         """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
 
         ``visit(number, met, t, end, found)`` gets a sphere's number, whether and where the ray
         meets it, and what an earlier visit has returned; the walk is over where the end is before
-        the origin.
+        the origin. The sphere with the number ``but`` is not visited.
         """
         types = types_of(end)
         inverse = dr.rcp(ray.direction)
@@ -100,7 +106,9 @@ class SphereTree:
             is_leaf = node >= self._leaves
             row = gather_row(self._rows, node, WIDTH)
             met, t = meet_sphere(ray, Ball(vec3(*row[:3]), row[3]))
-            end, found = visit(types.UInt32(row[4]), is_leaf & met, t, end, found)
+            number = types.UInt32(row[4])
+            counts = is_leaf if but is None else is_leaf & (number != but)
+            end, found = visit(number, counts & met, t, end, found)
             left = _meets_box(ray.origin, inverse, end, vec3(*row[0:3]), vec3(*row[3:6]))
             right = _meets_box(ray.origin, inverse, end, vec3(*row[6:9]), vec3(*row[9:12]))
             nearer = dr.select(right < left, 1, 0)
