@@ -46,6 +46,8 @@ ROUNDED = {
     "spheres one by one",
     "camera rays of covered pixels",
 }
+# Pixels in which a path may pass the other side of an outline, by rounding.
+AT_OUTLINES = {"spheres one by one": 2}
 # Paths that share camera rays are other samples: `test_launch` compares their means.
 OTHER_SAMPLES = {"a camera ray for each path"}
 # As many operations or fewer, for more lanes.
@@ -83,7 +85,8 @@ def assert_same(skip: Skip, scene: drpt.Scene) -> tuple[Run, Run]:
     with undone(skip):
         full = run(work)
     tolerance = ROUNDING if skip.what in ROUNDED else 0
-    assert full.result.image == pytest.approx(plain.result.image, rel=tolerance, abs=0)
+    same = np.isclose(full.result.image, plain.result.image, rtol=tolerance, atol=0).all(axis=-1)
+    assert (~same).sum() <= AT_OUTLINES.get(skip.what, 0)
     return plain, full
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from drpt.kernel.cells import LINKS, LONGEST, SHARES, Cells, cut, rows_of
+from drpt.kernel.cells import LINKS, LONGEST, Cells, cut, rows_of
 from drpt.kernel.spheres import CROWD, SPHERE_LIMIT, STANDOUTS, lay_out
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def test_spheres_lie_in_all_cells_that_they_reach(sides: tuple[float, float, flo
     cells = cells_of(spheres)
     pairs = set(zip(cells.cell.tolist(), cells.sphere.tolist(), strict=True))
     assert len(pairs) == len(cells.cell)
+    spheres = cells.local(spheres)
     for place in np.ndindex(*cells.counts):
         low = cells.low + place * cells.width
         nearest = np.clip(spheres[:, :3], low, low + cells.width)
@@ -58,53 +59,54 @@ def test_cells_are_cubes_as_many_as_spheres() -> None:
 
 def test_rows_of_a_cell_are_linked() -> None:
     spheres = scattered(300, 0.2)
-    cells = cells_of(spheres)
-    marks = np.arange(300) * 55_000 % LINKS
-    rows = rows_of(cells, spheres, marks)
+    cells, numbers = cells_of(spheres), 7 + np.arange(300) * 55_000
+    rows = rows_of(cells, spheres, numbers)
     for cell in range(cells.total):
-        expected = cells.sphere[cells.cell == cell].tolist()
+        expected = numbers[cells.sphere[cells.cell == cell]].tolist()
         if not expected:
             assert not rows.words[cell].any()
             continue
         found: list[int] = []
         row = cell
         while row or not found:
-            found.append(int(rows.spheres[row]))
             x, y, z = rows.words[row, :3].tolist()
-            assert x % 256 + y % 256 * 256 + z % 256 * 256**2 == marks[found[-1]]
+            found.append(7 + x % 256 + y % 256 * 256 + z % 256 * 256**2)
+            assert rows.numbers[row] == found[-1]
+            sphere = spheres[numbers == found[-1]]
+            assert (rows.spheres[row] == cells.local(sphere)).all()
             row = int(rows.words[row, 3]) % LINKS
         assert found == expected
 
 
-@pytest.mark.parametrize("around", [0, 1, 500])
-@pytest.mark.parametrize("radius", [1e-30, 1e-19, 0.001, 0.5, 1, 2**0.5, 2, 3, 1e18])
-def test_spheres_lie_in_balls_around_their_marked_centers(radius: float, around: float) -> None:
+@pytest.mark.parametrize("around", [0, 1, 1e5])
+@pytest.mark.parametrize("radius", [1e-9, 0.001, 0.5, 1, 2**0.5, 2, 3, 1e9])
+def test_words_tell_balls_in_which_spheres_lie(radius: float, around: float) -> None:
     spheres = scattered(40, 1) * (radius, radius, radius, radius / 10)
     spheres[:, :3] += around * radius
-    rows = rows_of(cells_of(spheres), spheres, np.full(40, LINKS - 1))
+    rows = rows_of(cells_of(spheres), spheres, 0xABCDEF * np.arange(40) // 40)
     used = rows.words[:, 3] > 0
     centers = rows.words[used, :3].copy().view(np.float32).astype(float)
     above = (rows.words[used, 3] // LINKS * 2**23).view(np.float32).astype(float)
-    sphere = spheres[rows.spheres[used]]
+    sphere = rows.spheres[used]
     moved = np.linalg.norm(centers - sphere[:, :3], axis=1)
     assert (moved > 0).all()
     assert (above >= np.square(moved + sphere[:, 3])).all()
     reach = sphere[:, 3] + 2.0**-15 * np.linalg.norm(sphere[:, :3], axis=1)
-    assert (above <= np.maximum(2.01 * np.square(reach), 2.0**-126)).all()
+    assert (above <= 2.01 * np.square(reach)).all()
 
 
 def test_spheres_that_all_lie_in_each_other_have_no_cells() -> None:
     spheres = scattered(1000, 1)
     spheres[:, 3] += 1
     assert cut(spheres) is None
-    assert SHARES < 1000
 
 
-@pytest.mark.parametrize("side", [1, 1e-20])
+@pytest.mark.parametrize("side", [1, 1e-9])
 def test_spheres_that_are_far_for_their_size_have_no_cells(side: float) -> None:
     spheres = scattered(100, 0.1 * side, (side, side, side))
+    spheres[:, 0] += 1e8 * side
     assert cut(spheres) is not None
-    spheres[:, 0] += 1e4 * side
+    spheres[:, 0] += 1e10 * side
     assert cut(spheres) is None
 
 

@@ -21,25 +21,28 @@ SHARES = 8
 ROOM = 2.0**-14
 """By which spheres are larger for their cells, relative to the grid.
 
-That is twice what a ray's distances to cells' sides are off, as sums of up to `LONGEST` terms.
+That is twice what a ray's distances to cells' sides are off, as sums of up to `LONGEST` terms, if
+it starts at the grid.
 """
-FAR = 2.0**10
-"""How far from the origin spheres are at the most, relative to the grid: `ROOM` above rounding."""
+FAR = 2.0**30
+"""How far from the origin spheres are at the most, relative to the grid, for float64."""
 LINKS = 2**24
-"""Rows that a word has room to tell apart, beside an exponent; and spheres that marks tell."""
+"""Rows that a word has room to tell apart, beside an exponent."""
 DIGIT_BITS = 8
 """Of each coordinate in a row, for a digit of the sphere's mark: 24 in all three."""
-_EXPONENT_OF_1, _EXPONENT_OF_INFINITY = 127, 255
-"""As the bits of a floating-point number of 32 bits tell them."""
+_MANTISSA_BITS, _EXPONENT_OF_1 = 23, 127
+"""Of a floating-point number of 32 bits."""
 
 
 class Cells(NamedTuple):
     """A box between two corners (3,), cut into ``counts`` (3,) cells; in which of them spheres lie.
 
     There is one more cell on each side, which is empty. ``cell`` and ``sphere`` are the numbers of
-    each pair (n,) of a cell and a sphere in it, in the order of the cells.
+    each pair (n,) of a cell and a sphere in it, in the order of the cells. Corners are relative to
+    the ``center`` (3,), whose coordinates have 32 bits.
     """
 
+    center: Array
     low: Array
     high: Array
     counts: Ints
@@ -61,6 +64,10 @@ class Cells(NamedTuple):
         """How many cells there are, those on the sides included."""
         return int((self.counts + 2).prod())
 
+    def local(self, spheres: Array) -> Array:
+        """Spheres (n, 4) relative to the centre."""
+        return _moved(spheres, -self.center)
+
     @property
     def crowd(self) -> float:
         """How many spheres lie in a cell where a sphere lies, on average."""
@@ -69,12 +76,18 @@ class Cells(NamedTuple):
 
 
 def cut(spheres: Array) -> Cells | None:
-    """Cells for spheres (n, 4); none where they are far, or too many of them lie in many cells."""
-    centers, radii = spheres[:, :3], spheres[:, 3:]
-    low, high = (centers - radii).min(axis=0), (centers + radii).max(axis=0)
+    """Cells for spheres (n, 4); none where too many of them lie in many cells, or they are too far.
+
+    Also where a word has no room for the numbers of all rows.
+    """
+    low, high = _corners(spheres)
     longest = (high - low).max()
-    if np.abs(centers).max() > FAR * longest:
+    if np.abs([low, high]).max() > FAR * longest:
         return None
+    center = ((low + high) / 2).astype(np.float32).astype(np.float64)
+    spheres = _moved(spheres, -center)
+    centers, radii = spheres[:, :3], spheres[:, 3:]
+    low, high = _corners(spheres)
     room = ROOM * longest
     low, high = low - 2 * room, high + 2 * room
     counts = _counts(high - low, len(spheres) / DENSITY)
@@ -91,11 +104,21 @@ def cut(spheres: Array) -> Cells | None:
     offsets = np.column_stack([number % x, number // x % y, number // (x * y)])
     cell = (first[sphere] + offsets + 1) @ _strides(counts)
     order = np.argsort(cell, kind="stable")
-    return Cells(low, high, counts, cell[order], sphere[order])
+    return Cells(center, low, high, counts, cell[order], sphere[order])
+
+
+def _corners(spheres: Array) -> tuple[Array, Array]:
+    """Of the box around spheres (n, 4)."""
+    centers, radii = spheres[:, :3], spheres[:, 3:]
+    return (centers - radii).min(axis=0), (centers + radii).max(axis=0)
+
+
+def _moved(spheres: Array, by: Array) -> Array:
+    return spheres + np.append(by, 0)
 
 
 def _counts(extent: Array, cells: float) -> Ints:
-    """So many cells along each axis that they are about cubes, and about so many in all."""
+    """How many cells along each axis, about cubes and so many in all, or fewer of a long box."""
     width = (extent.prod() / cells) ** (1 / 3)
     return np.clip(np.round(extent / width), 1, LONGEST).astype(np.intp)
 
@@ -110,38 +133,41 @@ class Rows(NamedTuple):
     ``words`` (n, 4) are the bits of a sphere's centre, the last of each coordinate a digit of its
     mark, and a word: the exponent of a power of two that is above the square of the radius around
     there, and the number of the row where there is another one in the same cell, or 0. Those of
-    cells that have no sphere are 0. ``spheres`` (n,) are their numbers.
+    cells that have no sphere are 0. ``spheres`` (n, 4) are the spheres as they are, relative to
+    the grid's centre, and ``numbers`` (n,) theirs.
+
+    A mark is a sphere's number, counted from the first one. There are fewer than `LINKS` of them,
+    as there are more rows than that.
     """
 
     words: NDArray[np.uint32]
-    spheres: NDArray[np.uint32]
+    spheres: Array
+    numbers: NDArray[np.uint32]
 
 
-def rows_of(cells: Cells, spheres: Array, marks: Ints) -> Rows:
-    """Rows of all cells, each with the first sphere in it, then those of the other ones.
-
-    A sphere is known by its mark (n,), a number below `LINKS`.
-    """
+def rows_of(cells: Cells, spheres: Array, numbers: Ints) -> Rows:
+    """Rows of all cells, each with the first sphere in it, then those of the other ones."""
+    spheres = cells.local(spheres)
     first = np.diff(cells.cell, prepend=-1) > 0
     others = len(first) - first.sum()
-    words = np.zeros((cells.total + others, 4), np.uint32)
-    numbers = np.zeros(len(words), np.uint32)
     row = cells.cell.copy()
     row[~first] = cells.total + np.arange(others)
     link = np.append(np.where(first[1:], 0, row[1:]), 0)
-    centers, exponents = _marked(spheres, marks)
-    words[row, :3] = centers[cells.sphere]
-    words[row, 3] = exponents[cells.sphere] * LINKS + link
-    numbers[row] = cells.sphere
-    return Rows(words, numbers)
+    words = np.zeros((cells.total + others, 4), np.uint32)
+    words[row] = _words(spheres, numbers - numbers[0])[cells.sphere]
+    words[row, 3] += link.astype(np.uint32)
+    in_row = np.zeros(len(words), np.intp)
+    in_row[row] = cells.sphere
+    return Rows(words, spheres[in_row], numbers[in_row].astype(np.uint32))
 
 
-def _marked(spheres: Array, marks: Ints) -> tuple[NDArray[np.uint32], Ints]:
-    """Bits of marked centres (n, 3), and exponents (n,) of powers of two above radii squared."""
+def _words(spheres: Array, marks: Ints) -> NDArray[np.uint32]:
+    """Words (n, 4) of spheres, as in a row without a link."""
     centers, radii = spheres[:, :3], spheres[:, 3]
     bits = np.float32(centers).view(np.uint32)
     digits = marks[:, None] >> DIGIT_BITS * np.arange(3)
     bits ^= ((bits ^ digits) % 2**DIGIT_BITS).astype(np.uint32)
-    moved = 2.0 ** (DIGIT_BITS - 23) * np.linalg.norm(centers, axis=1)
+    # A digit and rounding change a coordinate by less than a unit of the place before the digit.
+    moved = 2.0 ** (DIGIT_BITS - _MANTISSA_BITS) * np.linalg.norm(centers, axis=1)
     _, exponents = np.frexp(np.square(radii + moved) * (1 + ROOM))
-    return bits, np.clip(exponents + _EXPONENT_OF_1, 1, _EXPONENT_OF_INFINITY)
+    return np.column_stack([bits, (exponents + _EXPONENT_OF_1) * LINKS]).astype(np.uint32)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.facets import Facet
+    from drpt.kernel.intersect import ManySpheres
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.solids import Solid
 
@@ -99,7 +100,7 @@ class DeviceScene:
     light_facets: tuple[Facet, ...]
     light_mesh: TriangleMesh | None
     balls: tuple[tuple[int, Ball], ...]
-    many_spheres: SphereGrid | SphereTree | None
+    many_spheres: ManySpheres | None
     surfaces: Float
     smooth: Float
     lights: Float
@@ -171,25 +172,25 @@ def upload(primitives: Primitives, types: ModuleType) -> DeviceScene:
 
 
 def _many_spheres(
-    primitives: Primitives, types: ModuleType, upload: Callable[[NDArray[Any]], Any]
-) -> SphereGrid | SphereTree | None:
+    primitives: Primitives, types: ModuleType, array: Callable[[NDArray[Any]], Any]
+) -> ManySpheres | None:
     _, many, cells = primitives.sphere_layout
     spheres, numbers = primitives.spheres[many], primitives.first_sphere + many
     if not len(many):
         return None
     if cells is None:
-        return SphereTree(spheres, numbers, upload)
-    return SphereGrid(cells, spheres, numbers, types, upload)
+        return SphereTree(spheres, numbers, array)
+    return SphereGrid(cells, spheres, numbers, types, array)
 
 
 def _light_tree(
-    primitives: Primitives, types: ModuleType, upload: Callable[[NDArray[np.float64]], Float]
+    primitives: Primitives, types: ModuleType, array: Callable[[NDArray[np.float64]], Float]
 ) -> LightTree | None:
     if len(primitives.radiance) < 2:
         return None
     power = primitives.light_areas() * (primitives.radiance @ LUMINANCE)
     power[: primitives.sphere_lights] /= 4  # of a sphere's area, so much faces a receiver
-    return LightTree(primitives.light_balls(), power, types, upload)
+    return LightTree(primitives.light_balls(), power, types, array)
 
 
 def _loose(primitives: Primitives, solids: tuple[Solid, ...]) -> Iterator[tuple[int, Facet, bool]]:

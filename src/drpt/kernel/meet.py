@@ -1,4 +1,4 @@
-"""Where a ray meets a single thing: a convex body, a facet, a sphere."""
+"""Where a ray meets a single thing: a box, a convex body, a facet, a sphere."""
 
 from __future__ import annotations
 
@@ -35,6 +35,23 @@ class Ball:
     center: Array3f
     radius: Float
     power: Float | None = None
+
+
+def meet_box(
+    origin: Array3f, inverse: Array3f, low: Array3f, high: Array3f, end: Any
+) -> tuple[Float, Float]:
+    """Where rays, by their reciprocal directions, are in a box on their way to an ``end``.
+
+    They enter after they leave if they miss it; from inside they enter at 0.
+    """
+    enters: Any = types_of(inverse.x).Float32(0)
+    leaves: Any = end
+    for axis in range(3):
+        upward = inverse[axis] > 0
+        first, last = ((side[axis] - origin[axis]) * inverse[axis] for side in (low, high))
+        enters = greater(dr.select(upward, first, last), enters)
+        leaves = lesser(dr.select(upward, last, first), leaves)
+    return enters, leaves
 
 
 def meet_solid(ray: Ray, solid: Solid) -> tuple[UInt32, Bool, Float]:

@@ -1,51 +1,102 @@
 """Many spheres: a grid of cells, which a ray crosses one after the other.
 
-Source: Amanatides & Woo 1987, "A Fast Voxel Traversal Algorithm for Ray Tracing".
+Source: Amanatides & Woo 1987, "A Fast Voxel Traversal Algorithm for Ray Tracing"; here several
+cursors take the cells by turns, none of which waits for the rows of another.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
-import numpy as np
 
 from drpt.kernel.camera import Ray
 from drpt.kernel.cells import DIGIT_BITS, LINKS, rows_of
-from drpt.kernel.meet import Ball, meet_sphere
-from drpt.kernel.vec import gather_row, greater, lesser, types_of, vec3
+from drpt.kernel.meet import Ball, meet_box, meet_sphere
+from drpt.kernel.vec import gather_row, lesser, types_of, vec3
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import ModuleType
 
+    import numpy as np
     from drjit.auto import Array3f, Array3u, Bool, Float, UInt32
     from numpy.typing import NDArray
 
     from drpt.kernel.cells import Cells
-    from drpt.kernel.sphere_tree import Visit
+    from drpt.kernel.intersect import Visit
 
     Array = NDArray[np.float64]
     Ints = NDArray[np.intp]
 
 AFAR = 2.0**-20
 """By which a walk starts before the grid, and a ray may miss it, relative to the distance there."""
+BEFORE = 1 / 4
+"""By which it starts before the grid at the most, relative to the size of that.
+
+A ray that is still farther off then, by rounding, has come from so far away that the grid is
+smaller than what its direction tells apart.
+"""
+CURSORS = 3
+"""Rows that a ray looks at at once: while those of one come from memory, others are at work."""
 _EXPONENT = 0x7F800000
 """Bits that the exponent of a floating-point number has."""
+_NO_ROW = 0
+"""That of a cell on the sides, where no sphere is."""
 
 
-class _Walk(NamedTuple):
-    """Where a walk is: at a row of a cell, which the ray enters at ``t``; and what it has found.
+class _Cell(NamedTuple):
+    """A cell, and how far it is along a ray to the next side of it along each axis."""
 
-    ``sides`` are how far it is along the ray to the next side of the cell along each axis.
+    number: UInt32
+    sides: Array3f
+
+
+class _Cursor(NamedTuple):
+    """A row of a cell, which the ray enters at ``t``."""
+
+    row: UInt32
+    t: Float
+
+
+class _Look(NamedTuple):
+    """Whether a row's sphere is close to the line of a ray, and the next row of its cell, or 0."""
+
+    close: Bool
+    link: UInt32
+
+
+@dataclass
+class _Course:
+    """How a ray goes from cell to cell, until it ``leaves`` the grid.
+
+    For each axis, how far it is along the ray from one side to the next, and by how much the number
+    of the cell changes there.
     """
 
-    t: Float
-    row: UInt32
-    cell: UInt32
-    sides: Array3f
-    end: Float
-    found: UInt32
+    leaves: Float
+    widths: Array3f
+    strides: Array3u
+
+    def next_cell(self, cell: _Cell, where: Bool) -> tuple[_Cell, _Cursor]:
+        """The next cell for the lanes ``where`` that is wanted, and a cursor at its first row."""
+        sides = cell.sides
+        t = lesser(lesser(sides.x, sides.y), sides.z)
+        # Over an edge at once: what lies near it is in the cells before and after it, too.
+        over = where & (sides == t)
+        number = cell.number + dr.sum(dr.select(over, self.strides, type(self.strides)(0)))
+        row = dr.select(t < self.leaves, number, _NO_ROW)
+        return _Cell(number, dr.select(over, sides + self.widths, sides)), _Cursor(row, t)
+
+    def next_row(self, cell: _Cell, cursor: _Cursor, link: UInt32) -> tuple[_Cell, _Cursor]:
+        """Move a cursor to the next row of its cell, else to the next cell; returns also that."""
+        crosses = link == 0
+        cell, first = self.next_cell(cell, crosses)
+        row, t = dr.select(crosses, first.row, link), dr.select(crosses, first.t, cursor.t)
+        return cell, _Cursor(row, t)
 
 
 class SphereGrid:
@@ -59,19 +110,18 @@ class SphereGrid:
         types: ModuleType,
         upload: Callable[[NDArray[Any]], Any],
     ) -> None:
-        rows = rows_of(cells, spheres, numbers - numbers[0])
-        self._words = upload(rows.words)
+        rows = rows_of(cells, spheres, numbers)
+        self._words, self._spheres, self._numbers = (upload(table) for table in rows)
         self._first = int(numbers[0])
-        self._numbers = upload(numbers[rows.spheres].astype(np.uint32))
-        self._spheres = upload(spheres[rows.spheres])
-        self._low, self._high, self._width, self._per_width = (
-            types.Array3f(*(dr.opaque(types.Float32, float(x)) for x in corner))
-            for corner in (cells.low, cells.high, cells.width, 1 / cells.width)
+        self._center, self._low, self._high, self._width, self._per_width = (
+            types.Array3f(*(dr.opaque(types.Float32, float(x)) for x in vector))
+            for vector in (cells.center, cells.low, cells.high, cells.width, 1 / cells.width)
         )
         self._last, self._strides = (
             types.Array3u(*(dr.opaque(types.UInt32, int(x)) for x in counts))
             for counts in (cells.counts - 1, cells.strides)
         )
+        self._size = dr.opaque(types.Float32, float((cells.high - cells.low).max()))
 
     def walk(
         self,
@@ -82,72 +132,54 @@ class SphereGrid:
         visit: Visit,
         but: UInt32 | None = None,
     ) -> tuple[Float, UInt32]:
-        """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
+        """As all `ManySpheres` do.
 
-        ``visit(number, met, t, end, found)`` gets a sphere's number, whether and where the ray
-        meets it, and what an earlier visit has returned; the walk is over where the end is before
-        the origin. The sphere with the number ``but`` is not visited.
-
-        Distances are measured from where the ray enters the grid, so that from afar the cells are
-        where the spheres are.
+        Distances are measured from where the ray enters the grid, and coordinates from its centre,
+        so that from afar the cells are where the spheres are.
         """
-        types = types_of(end)
-        near, far = self._span(ray)
+        origin = ray.origin - self._center
+        near, far = self._span(Ray(origin, ray.direction))
         active = active & (near <= lesser(far * (1 + AFAR), end)) & (near < dr.inf)
-        start = dr.select(active, near * (1 - AFAR), 0)
-        ray = Ray(dr.fma(ray.direction, start, ray.origin), ray.direction)
-        _, leaves = self._span(ray)
-        cell, sides, widths, strides = self._enter(ray)
+        start = dr.select(active, near - lesser(near * AFAR, self._size * BEFORE), 0)
+        ray = Ray(dr.fma(ray.direction, start, origin), ray.direction)
+        enters, leaves = self._span(ray)
+        active &= enters < self._size
+        cell, course = self._enter(ray, leaves)
         digits = None if but is None else self._digits(but)
 
-        def step(*state: Any) -> tuple[Any, ...]:
-            walk = _Walk(*state)
-            close, link = self._look(walk.row, ray, digits)
+        def step(place: Any, end: Float, found: UInt32, *state: Any) -> tuple[Any, ...]:
+            cell, cursors = _Cell(*place), [_Cursor(*cursor) for cursor in state]
+            looks = [self._look(cursor.row, ray, digits) for cursor in cursors]
 
             def meet(end: Float, found: UInt32) -> tuple[Float, UInt32]:
-                sphere = gather_row(self._spheres, walk.row, 4, close)
-                met, t = meet_sphere(ray, Ball(vec3(*sphere[:3]), sphere[3]))
-                number = dr.gather(types.UInt32, self._numbers, walk.row, close)
-                return visit(number, met, t + start, end, found)
+                for cursor, look in zip(cursors, looks, strict=True):
+                    number, met, t = self._meet(cursor.row, ray, look.close)
+                    end, found = visit(number, met, start + t, end, found)
+                return end, found
 
-            end, found = dr.if_stmt((walk.end, walk.found), close, meet, lambda *state: state)
-            crosses = link == 0
-            t = lesser(lesser(walk.sides.x, walk.sides.y), walk.sides.z)
-            # Over an edge at once: what lies near it is in the cells before and after it, too.
-            over = crosses & (walk.sides == t)
-            cell = walk.cell + dr.sum(dr.select(over, strides, types.Array3u(0)))
-            row = dr.select(crosses, cell, link)
-            sides = dr.select(over, walk.sides + widths, walk.sides)
-            t = dr.select(crosses, t, walk.t)
-            return tuple(_Walk(t, row, cell, sides, end, found))
+            any_close = reduce(or_, (look.close for look in looks))
+            end, found = dr.if_stmt((end, found), any_close, meet, lambda *state: state)
+            for k, look in enumerate(looks):
+                cell, cursors[k] = course.next_row(cell, cursors[k], look.link)
+            return tuple(cell), end, found, *map(tuple, cursors)
 
-        def goes_on(*state: Any) -> Bool:
-            walk = _Walk(*state)
-            return active & (walk.t < lesser(leaves, walk.end - start))
+        def goes_on(_: Any, end: Float, __: UInt32, *cursors: Any) -> Bool:
+            hindmost = reduce(lesser, (_Cursor(*cursor).t for cursor in cursors))
+            return active & (hindmost < lesser(course.leaves, end - start))
 
-        first: tuple[Any, ...] = _Walk(types.Float32(0), cell, cell, sides, end, found)
-        last = _Walk(*dr.while_loop(tuple(first), goes_on, step))
-        return last.end, last.found
+        cursors = [_Cursor(cell.number, types_of(end).Float32(0))]
+        while len(cursors) < CURSORS:
+            cell, cursor = course.next_cell(cell, active)
+            cursors.append(cursor)
+        state: tuple[Any, ...] = (tuple(cell), end, found, *map(tuple, cursors))
+        _, end, found, *_ = dr.while_loop(state, goes_on, step)
+        return end, found
 
     def _span(self, ray: Ray) -> tuple[Float, Float]:
-        """Where a ray enters and leaves the grid, or the second before the first; at 0 inside."""
-        near: Any = types_of(ray.origin.x).Float32(0)
-        far: Any = types_of(ray.origin.x).Float32(dr.inf)
-        for axis in range(3):
-            inverse = dr.rcp(ray.direction[axis])
-            low, high = (
-                (corner[axis] - ray.origin[axis]) * inverse for corner in (self._low, self._high)
-            )
-            near = greater(dr.select(inverse > 0, low, high), near)
-            far = lesser(dr.select(inverse > 0, high, low), far)
-        return near, far
+        return meet_box(ray.origin, dr.rcp(ray.direction), self._low, self._high, dr.inf)
 
-    def _enter(self, ray: Ray) -> tuple[UInt32, Array3f, Array3f, Array3u]:
-        """The cell where a ray starts, and for each axis how it goes on from there.
-
-        That is how far it is along the ray to the first side of a cell, and from there to the next
-        one, and by how much the number of the cell changes.
-        """
+    def _enter(self, ray: Ray, leaves: Float) -> tuple[_Cell, _Course]:
+        """The cell where a ray starts, and how it goes on from there."""
         types = types_of(ray.origin.x)
         place = dr.floor((ray.origin - self._low) * self._per_width)
         place = dr.maximum(0, dr.minimum(place, types.Array3f(self._last)))
@@ -155,20 +187,17 @@ class SphereGrid:
         side = dr.fma(place + dr.select(upward, 1, 0), self._width, self._low)
         inverse = dr.rcp(ray.direction)
         away = dr.select(ray.direction == 0, dr.inf, (side - ray.origin) * inverse)
+        number = dr.dot(types.Array3u(place) + 1, self._strides)
         strides = dr.select(upward, self._strides, -self._strides)
-        cell = dr.dot(types.Array3u(place) + 1, self._strides)
-        return cell, away, dr.abs(self._width * inverse), strides
+        return _Cell(number, away), _Course(leaves, dr.abs(self._width * inverse), strides)
 
     def _digits(self, number: UInt32) -> Array3u:
         """What the coordinates of a sphere end with in its rows; of none, if it is not in there."""
         mark = dr.minimum(number - self._first, LINKS - 1)
         return types_of(number).Array3u(mark, mark >> DIGIT_BITS, mark >> 2 * DIGIT_BITS)
 
-    def _look(self, row: UInt32, ray: Ray, but: Array3u | None) -> tuple[Bool, UInt32]:
-        """Whether a row's sphere is close to the line of a ray, and the next row of the cell.
-
-        Spheres whose coordinates end with the digits ``but`` are not.
-        """
+    def _look(self, row: UInt32, ray: Ray, but: Array3u | None) -> _Look:
+        """Look at a row; spheres whose coordinates end with the digits ``but`` are not close."""
         types = types_of(ray.origin.x)
         x, y, z, word = gather_row(self._words, row, 4)
         bits = (x, y, z, (word >> 1) & _EXPONENT)
@@ -179,4 +208,10 @@ class SphereGrid:
         if but is not None:
             differ = (x ^ but.x) | (y ^ but.y) | (z ^ but.z)
             close &= (differ & (2**DIGIT_BITS - 1)) != 0
-        return close, word & (LINKS - 1)
+        return _Look(close, word & (LINKS - 1))
+
+    def _meet(self, row: UInt32, ray: Ray, close: Bool) -> tuple[UInt32, Bool, Float]:
+        """The number of a row's sphere, and whether and where a ray that is close meets it."""
+        sphere = gather_row(self._spheres, row, 4, close)
+        met, t = meet_sphere(ray, Ball(vec3(*sphere[:3]), sphere[3]))
+        return dr.gather(type(row), self._numbers, row, close), close & met, t

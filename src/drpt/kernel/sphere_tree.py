@@ -6,12 +6,12 @@ parents, so that a walk goes on at the sibling that it has passed over instead o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import drjit as dr
 import numpy as np
 
-from drpt.kernel.meet import Ball, meet_sphere
+from drpt.kernel.meet import Ball, meet_box, meet_sphere
 from drpt.kernel.vec import gather_row, greater, lesser, types_of, vec3
 
 if TYPE_CHECKING:
@@ -21,14 +21,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.camera import Ray
+    from drpt.kernel.intersect import Visit
 
     Array = NDArray[np.float64]
-    Visit = Callable[[UInt32, Bool, Float, Float, UInt32], tuple[Float, UInt32]]
 
 WIDTH = 16
 """Numbers in the row of a node: the boxes of its children, or a sphere and its own number.
 
-That is exact up to 2²⁴."""
+As a floating-point one, a sphere's number is exact up to 2²⁴.
+"""
 ROOM = 2.0**-20
 """By which boxes are larger than what is in them, relative to the largest coordinate: 8 ulps."""
 
@@ -91,12 +92,7 @@ class SphereTree:
         visit: Visit,
         but: UInt32 | None = None,
     ) -> tuple[Float, UInt32]:
-        """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
-
-        ``visit(number, met, t, end, found)`` gets a sphere's number, whether and where the ray
-        meets it, and what an earlier visit has returned; the walk is over where the end is before
-        the origin. The sphere with the number ``but`` is not visited.
-        """
+        """As all `ManySpheres` do."""
         types = types_of(end)
         inverse = dr.rcp(ray.direction)
 
@@ -109,8 +105,9 @@ class SphereTree:
             number = types.UInt32(row[4])
             counts = is_leaf if but is None else is_leaf & (number != but)
             end, found = visit(number, counts & met, t, end, found)
-            left = _meets_box(ray.origin, inverse, end, vec3(*row[0:3]), vec3(*row[3:6]))
-            right = _meets_box(ray.origin, inverse, end, vec3(*row[6:9]), vec3(*row[9:12]))
+            left, right = (
+                _meets_box(ray.origin, inverse, box, end) for box in (row[0:6], row[6:12])
+            )
             nearer = dr.select(right < left, 1, 0)
             second = dr.select(greater(left, right) < dr.inf, 1, 0)
             descends = ~is_leaf & (lesser(left, right) < dr.inf)
@@ -131,12 +128,7 @@ def _widened(rows: Array) -> Array:
     return np.pad(rows, ((0, 0), (0, WIDTH - rows.shape[1])))
 
 
-def _meets_box(origin: Array3f, inverse: Array3f, end: Float, low: Array3f, high: Array3f) -> Float:
-    near: Any = types_of(end).Float32(0)
-    far: Any = end
-    for axis in range(3):
-        upward = inverse[axis] > 0
-        first, last = ((limit[axis] - origin[axis]) * inverse[axis] for limit in (low, high))
-        near = greater(dr.select(upward, first, last), near)
-        far = lesser(dr.select(upward, last, first), far)
-    return dr.select(near <= far * (1 + ROOM), near, dr.inf)
+def _meets_box(origin: Array3f, inverse: Array3f, box: list[Float], end: Float) -> Float:
+    """Where rays meet a box between two corners (6,) before an end, or infinity."""
+    enters, leaves = meet_box(origin, inverse, vec3(*box[:3]), vec3(*box[3:]), end)
+    return dr.select(enters <= leaves * (1 + ROOM), enters, dr.inf)
