@@ -12,7 +12,7 @@ import drpt
 from drpt.kernel.camera import Ray
 from drpt.kernel.estimator import Mode
 from drpt.kernel.intersect import closest_hit, occluded
-from drpt.kernel.launch import make_launcher, prepare
+from drpt.kernel.launch import forget, make_launcher, prepare
 from drpt.kernel.sphere_grid import SphereGrid
 from drpt.kernel.sphere_tree import SphereTree
 from drpt.kernel.spheres import SPHERE_LIMIT
@@ -143,6 +143,34 @@ def test_from_afar_nothing_is_lost_where_cells_meet() -> None:
     assert isinstance(prepare(tuple(shapes), TYPES)[1].many_spheres, SphereGrid)
     image = drpt.render(drpt.Scene(camera, shapes), 1, 0, "implicit").image[..., 0]
     assert image.mean() == pytest.approx(np.pi * 0.3**2, rel=2e-3)
+
+
+@pytest.mark.parametrize("distance", [1e3, 1e6, 1e9, 1e12, 1e13, 1e15, 1e18])
+def test_walks_from_afar_stay_in_the_grid(distance: float) -> None:
+    """Where a ray cannot be told to meet a grid, it meets nothing, or a sphere of it."""
+    balls, rng = Balls(500), np.random.default_rng(8)
+    ways = sample_uniform_sphere(rng, RAYS)
+    aims = balls.centers[rng.integers(0, 500, RAYS)]
+    number, t = balls.closest(aims - distance * ways, ways)
+    hit = number >= 0
+    assert hit.all() if distance < 1e4 else (number < 500).all()
+    assert t[hit] == pytest.approx(distance, abs=4, rel=1e-5)
+
+
+def test_far_from_the_origin_a_grid_is_as_exact_as_a_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(9)
+    centers = 900 + rng.uniform(0, 1, (500, 3))
+    shapes = [drpt.Sphere(center, 0.01, radiance=1) for center in centers]
+    shapes.append(drpt.Sphere((-900, -900, -900), 1, drpt.Diffuse(0.5)))
+    camera = drpt.Camera((900.5, 900.5, 904), (900.5, 900.5, 900.5), (0, 1, 0), 20, 64, 64)
+    images = []
+    for crowd in (np.inf, 0):
+        monkeypatch.setattr("drpt.kernel.spheres.CROWD", crowd)
+        forget()
+        images.append(drpt.render(drpt.Scene(camera, shapes), 16, 0, "implicit").image)
+    forget()
+    assert images[0].mean() > 0.05
+    assert (images[0] == images[1]).mean() > 0.99
 
 
 def test_walks_end_whatever_a_ray_is() -> None:

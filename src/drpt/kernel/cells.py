@@ -65,8 +65,8 @@ class Cells(NamedTuple):
         return int((self.counts + 2).prod())
 
     def local(self, spheres: Array) -> Array:
-        """Spheres (n, 4) relative to the centre."""
-        return _moved(spheres, -self.center)
+        """Spheres (n, 4) as the device knows them, relative to the centre."""
+        return _of_32_bits(spheres) - np.append(self.center, 0)
 
     @property
     def crowd(self) -> float:
@@ -80,14 +80,14 @@ def cut(spheres: Array) -> Cells | None:
 
     Also where a word has no room for the numbers of all rows.
     """
+    spheres = _of_32_bits(spheres)
     low, high = _corners(spheres)
     longest = (high - low).max()
     if np.abs([low, high]).max() > FAR * longest:
         return None
-    center = ((low + high) / 2).astype(np.float32).astype(np.float64)
-    spheres = _moved(spheres, -center)
-    centers, radii = spheres[:, :3], spheres[:, 3:]
-    low, high = _corners(spheres)
+    center = _of_32_bits((low + high) / 2)
+    centers, radii = spheres[:, :3] - center, spheres[:, 3:]
+    low, high = low - center, high - center
     room = ROOM * longest
     low, high = low - 2 * room, high + 2 * room
     counts = _counts(high - low, len(spheres) / DENSITY)
@@ -113,8 +113,8 @@ def _corners(spheres: Array) -> tuple[Array, Array]:
     return (centers - radii).min(axis=0), (centers + radii).max(axis=0)
 
 
-def _moved(spheres: Array, by: Array) -> Array:
-    return spheres + np.append(by, 0)
+def _of_32_bits(numbers: Array) -> Array:
+    return numbers.astype(np.float32).astype(np.float64)
 
 
 def _counts(extent: Array, cells: float) -> Ints:
