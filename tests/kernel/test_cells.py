@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drpt.kernel.cells import LINKS, LONGEST, Cells, cut, rows_of
-from drpt.kernel.spheres import CROWD, SPHERE_LIMIT, STANDOUTS, lay_out
+from drpt.kernel.spheres import CROWD, CROWDED_LIMIT, SPHERE_LIMIT, STANDOUTS, lay_out
 
 if TYPE_CHECKING:
     from tests.oracle.arrays import Floats
@@ -114,12 +114,23 @@ def test_an_axis_has_so_many_cells_at_the_most() -> None:
     assert cells_of(scattered(2000, 1e-6, (1, 0, 0))).counts.max() == LONGEST
 
 
-@pytest.mark.parametrize("count", [1, SPHERE_LIMIT])
-def test_few_spheres_are_met_one_by_one(count: int) -> None:
-    layout = lay_out(scattered(count, 0.1))
-    assert layout.single.tolist() == [*range(count)]
-    assert not len(layout.many)
-    assert layout.cells is None
+@pytest.mark.parametrize(
+    ("count", "radius", "alone"),
+    [
+        (1, 0.01, True),
+        (SPHERE_LIMIT, 0.01, True),
+        (CROWDED_LIMIT, 0.01, False),
+        (CROWDED_LIMIT, 0.4, True),
+        (CROWDED_LIMIT, 2, True),
+        (CROWDED_LIMIT + 1, 0.4, False),
+        (CROWDED_LIMIT + 1, 2, False),
+    ],
+)
+def test_few_spheres_are_met_one_by_one(count: int, radius: float, alone: bool) -> None:
+    layout = lay_out(scattered(count, radius))
+    assert layout.single.tolist() == [*range(count)] * alone
+    assert len(layout.single) + len(layout.many) == count
+    assert alone or (layout.cells is None) is (radius > 1)
 
 
 @pytest.mark.parametrize("large", [1, STANDOUTS])

@@ -14,7 +14,7 @@ from drpt.kernel.launch import prepare
 from drpt.kernel.primitives import FACET_LIMIT, make_primitives
 from drpt.kernel.sphere_grid import SphereGrid
 from drpt.kernel.sphere_tree import SphereTree
-from drpt.kernel.spheres import SPHERE_LIMIT
+from drpt.kernel.spheres import CROWDED_LIMIT
 from tests.conftest import TYPES
 
 if TYPE_CHECKING:
@@ -39,9 +39,11 @@ MANY = FACET_LIMIT + 1
 LAYERS = np.concatenate([np.add(CORNERS, (0, 0, z)) for z in range(MANY)])
 STRIPES = drpt.Mesh(LAYERS, np.arange(3 * MANY).reshape(-1, 3), material=DIFFUSE)
 PANELS = drpt.Mesh(LAYERS, STRIPES.faces, radiance=1)
-BALLS = [drpt.Sphere((3 * x, 0, 0), 1, material=DIFFUSE) for x in range(SPHERE_LIMIT + 1)]
+BALLS = [drpt.Sphere((3 * x, 0, 0), 1, material=DIFFUSE) for x in range(CROWDED_LIMIT + 1)]
 PIT = *BALLS, drpt.Sphere((0, 0, 20), 9, radiance=1)
-HEAPS = [drpt.Sphere((1e4 * (x % 2) + x / 9, 0, 0), 1, DIFFUSE) for x in range(SPHERE_LIMIT + 1)]
+HEAPS = [drpt.Sphere((1e4 * (x % 2) + x / 9, 0, 0), 1, DIFFUSE) for x in range(CROWDED_LIMIT + 1)]
+FEW = "2 spheres, few enough to be met one by one"
+TOO_MANY = "too many to be met one by one"
 IMPLICIT, EXPLICIT = {"mode": "implicit"}, {"mode": "explicit"}
 GUIDED: dict[str, Any] = {"mode": "guided"}
 ONE_SPHERE = "light samples of one sphere have all of its light on diffuse surfaces"
@@ -242,18 +244,13 @@ def test_every_feature_is_told() -> None:
         ("mesh", (False, "7 facets, not more than 64, or 24 that emit"), [*HOUSE], {}),
         ("mesh", (True, "65 triangles, more than 64, or 24 that emit"), [STRIPES, LAMP], {}),
         ("mesh", (True, "65 triangles, more than 64, or 24 that emit"), [BALL, PANELS], {}),
-        ("sphere_grid", (False, "2 spheres, not more than 32"), [BALL, LAMP], {}),
-        ("sphere_grid", (True, "34 spheres, more than 32"), [*BALLS, LAMP], {}),
-        ("sphere_grid", (True, "34 spheres, 1 of which stands out, more than 32"), [*PIT], {}),
-        ("sphere_grid", (False, "they are spread unevenly"), [*HEAPS, LAMP], {}),
-        ("sphere_tree", (False, "2 spheres, not more than 32"), [BALL, LAMP], {}),
-        ("sphere_tree", (False, "they are spread evenly"), [*BALLS, LAMP], {}),
-        (
-            "sphere_tree",
-            (True, "34 spheres, more than 32, spread unevenly"),
-            [*HEAPS, LAMP],
-            {},
-        ),
+        ("sphere_grid", (False, FEW), [BALL, LAMP], {}),
+        ("sphere_grid", (True, f"66 spheres, {TOO_MANY}"), [*BALLS, LAMP], {}),
+        ("sphere_grid", (True, f"66 spheres, 1 of which stands out, {TOO_MANY}"), [*PIT], {}),
+        ("sphere_grid", (False, "they are crowded"), [*HEAPS, LAMP], {}),
+        ("sphere_tree", (False, FEW), [BALL, LAMP], {}),
+        ("sphere_tree", (False, "they are not crowded"), [*BALLS, LAMP], {}),
+        ("sphere_tree", (True, f"66 spheres, {TOO_MANY}, and crowded"), [*HEAPS, LAMP], {}),
         ("facet_shadows", (True, "1 of 7 facets can stand before a light"), [*HOUSE], {}),
         ("facet_shadows", (False, "0 of 6 facets can stand before a light"), [ROOM, LAMP], {}),
         ("facet_shadows", (False, "mode implicit samples no light"), [*HOUSE], IMPLICIT),

@@ -15,7 +15,7 @@ from drpt.kernel.estimator import Mode
 from drpt.kernel.intersect import closest_hit, occluded
 from drpt.kernel.launch import make_launcher
 from drpt.kernel.primitives import FACET_LIMIT, make_primitives
-from drpt.kernel.spheres import SPHERE_LIMIT
+from drpt.kernel.spheres import CROWDED_LIMIT
 from tests.conftest import TYPES, to_host
 from tests.oracle import geometry
 from tests.oracle.arrays import dot, normalize, sample_uniform_sphere
@@ -149,7 +149,7 @@ SCENES: dict[str, Callable[[np.random.Generator], list[Shape]]] = {
     "one sphere": lambda rng: [*spheres(rng, 1)],
     "spheres": lambda rng: [*spheres(rng, 8)],
     "nested spheres": lambda rng: [*nested(rng)],
-    "many spheres": lambda rng: [*spheres(rng, SPHERE_LIMIT + 1)],
+    "many spheres": lambda rng: [*spheres(rng, CROWDED_LIMIT + 1)],
     "triangles": lambda rng: [*triangles(rng, 12)],
     "smooth triangles": lambda rng: [*triangles(rng, 8, smooth=True)],
     "many triangles": lambda rng: [*triangles(rng, FACET_LIMIT + 1)],
@@ -157,7 +157,7 @@ SCENES: dict[str, Callable[[np.random.Generator], list[Shape]]] = {
     "mixed": lambda rng: [*triangles(rng, 6), *spheres(rng, 5), *box(rng)],
     "many of all": lambda rng: [
         *triangles(rng, FACET_LIMIT + 1, smooth=True),
-        *spheres(rng, SPHERE_LIMIT + 1),
+        *spheres(rng, CROWDED_LIMIT + 1),
     ],
 }
 

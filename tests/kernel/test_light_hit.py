@@ -12,7 +12,7 @@ import drpt
 from drpt.kernel.camera import Ray
 from drpt.kernel.intersect import closest_hit, light_hit
 from drpt.kernel.launch import make_launcher
-from drpt.kernel.spheres import SPHERE_LIMIT
+from drpt.kernel.spheres import CROWDED_LIMIT
 from tests.conftest import TYPES, to_device
 from tests.oracle.arrays import normalize, sample_uniform_sphere
 from tests.random_scenes import tame_scene
@@ -32,7 +32,7 @@ LAMPS = (
 )
 SCREEN = drpt.Mesh([[-2, -2, 1.5], [0, -2, 1.5], [-1, 3, 1.5]], [[0, 1, 2]], material=DULL)
 BALL = drpt.Sphere((1, 0, 1), 0.7, material=DULL)
-MANY = tuple(drpt.Sphere((k % 9 - 4, k // 9 - 4, 3), 0.3, radiance=1) for k in range(SPHERE_LIMIT))
+MANY = tuple(drpt.Sphere((k % 9 - 4, k // 9 - 4, 3), 0.3, radiance=1) for k in range(CROWDED_LIMIT))
 SHAPES: dict[str, tuple[Shape, ...]] = {
     "lamps behind lamps": LAMPS,
     "screen and ball": (*LAMPS, SCREEN, BALL),

@@ -15,7 +15,7 @@ from drpt.kernel.intersect import closest_hit, occluded
 from drpt.kernel.launch import forget, make_launcher, prepare
 from drpt.kernel.sphere_grid import SphereGrid
 from drpt.kernel.sphere_tree import SphereTree
-from drpt.kernel.spheres import SPHERE_LIMIT
+from drpt.kernel.spheres import CROWDED_LIMIT
 from tests.conftest import TYPES, to_device, to_host
 from tests.oracle.arrays import normalize, sample_uniform_sphere
 
@@ -87,7 +87,7 @@ def rays(around: float) -> tuple[Floats, Floats]:
 
 
 @pytest.mark.parametrize("around", [1.0, 5.0])
-@pytest.mark.parametrize("count", [SPHERE_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [CROWDED_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
 def test_closest_hits_are_those_of_all_spheres(hierarchy: type, count: int, around: float) -> None:
     balls, (origins, directions) = Balls(count), rays(around)
     assert balls.hierarchy is hierarchy
@@ -100,7 +100,7 @@ def test_closest_hits_are_those_of_all_spheres(hierarchy: type, count: int, arou
     assert distance[hit] == pytest.approx(t[hit], abs=OUTLINE)
 
 
-@pytest.mark.parametrize("count", [SPHERE_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [CROWDED_LIMIT + 1, pytest.param(500, marks=pytest.mark.slow)])
 def test_shadows_are_those_of_all_spheres_but_the_light(hierarchy: type, count: int) -> None:
     balls, (origins, _) = Balls(count), rays(1.0)
     assert balls.hierarchy is hierarchy
@@ -127,11 +127,11 @@ def test_of_coincident_spheres_the_last_one_counts(
     hierarchy: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("drpt.kernel.cells.SHARES", np.inf)
-    balls = Balls(SPHERE_LIMIT + 9, lights=1, same=True)
+    balls = Balls(CROWDED_LIMIT + 9, lights=1, same=True)
     assert balls.hierarchy is hierarchy
     origins = balls.centers[0] + 3 * sample_uniform_sphere(np.random.default_rng(4), 64)
     number, _ = balls.closest(origins, (balls.centers[0] - origins) / 3)
-    assert (number == SPHERE_LIMIT + 8).all()
+    assert (number == CROWDED_LIMIT + 8).all()
 
 
 def test_from_afar_nothing_is_lost_where_cells_meet() -> None:
@@ -175,7 +175,7 @@ def test_far_from_the_origin_a_grid_is_as_exact_as_a_tree(monkeypatch: pytest.Mo
 
 def test_walks_end_whatever_a_ray_is() -> None:
     """Also those of rays that are not numbers, run along the cells' sides, or start at infinity."""
-    balls = Balls(SPHERE_LIMIT + 1)
+    balls = Balls(CROWDED_LIMIT + 1)
     low = balls.centers.min(axis=0)
     odd = [np.nan, np.inf, -np.inf, 0.0, -0.0, 1.0, 1e38, 1e-38, *low]
     numbers = np.array(np.meshgrid(*3 * [odd])).reshape(3, -1).T

@@ -7,7 +7,6 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from drpt.kernel.primitives import FACET_LIMIT, LIGHT_FACET_LIMIT
-from drpt.kernel.spheres import SPHERE_LIMIT
 
 if TYPE_CHECKING:
     from drpt.kernel.primitives import Primitives
@@ -253,13 +252,19 @@ def _sphere_facts(primitives: Primitives) -> dict[str, Fact]:
     alone = f", {len(single)} of which {verb} out" if len(single) else ""
     needs = (
         *_lit(primitives),
-        (len(many) > 0, f"{_number(spheres, 'sphere')}, not more than {SPHERE_LIMIT}"),
+        (len(many) > 0, f"{_number(spheres, 'sphere')}, few enough to be met one by one"),
     )
-    told = f"{spheres} spheres{alone}, more than {SPHERE_LIMIT}"
+    told = f"{spheres} spheres{alone}"
     return {
-        "sphere_grid": _decide(told, *needs, (cells is not None, "they are spread unevenly")),
+        "sphere_grid": _decide(
+            f"{told}, too many to be met one by one",
+            *needs,
+            (cells is not None, "they are crowded"),
+        ),
         "sphere_tree": _decide(
-            f"{told}, spread unevenly", *needs, (cells is None, "they are spread evenly")
+            f"{told}, too many to be met one by one, and crowded",
+            *needs,
+            (cells is None, "they are not crowded"),
         ),
     }
 

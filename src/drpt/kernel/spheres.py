@@ -13,17 +13,19 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-SPHERE_LIMIT = 32
-"""Up to so many spheres are met one by one in the kernel, where a grid is as fast."""
+SPHERE_LIMIT = 24
+"""Up to so many spheres are met one by one in the kernel, where a grid is as fast.
+
+That is of small ones, which are 2 in a cell; for each one more it takes as many spheres again.
+"""
+CROWDED_LIMIT = 64
+"""Up to so many are at the most: kernels of more take longer to compile than most renders."""
 STANDOUTS = 8
 """Up to so many that stand out are met one by one, so that those in a hierarchy are all small."""
 STANDING_OUT = 8
 """So many times as large as the middle one is a sphere that stands out."""
-CROWD = 7
-"""Up to so many spheres in the cells where they lie, a grid is as fast as a tree.
-
-Small spheres that are spread evenly have two.
-"""
+CROWD = 12
+"""Up to so many spheres in the cells where they lie, a grid is as fast as a tree."""
 
 
 class SphereLayout(NamedTuple):
@@ -40,13 +42,15 @@ class SphereLayout(NamedTuple):
 def lay_out(spheres: Array) -> SphereLayout:
     """How rows (n, 4) of (centre, radius) are met."""
     numbers, radii = np.arange(len(spheres)), spheres[:, 3]
+    one_by_one = SphereLayout(numbers, numbers[:0], None)
     if len(spheres) <= SPHERE_LIMIT:
-        return SphereLayout(numbers, numbers[:0], None)
+        return one_by_one
     single = radii > STANDING_OUT * np.median(radii)
     if single.sum() > STANDOUTS:
         single[:] = False
     many = numbers[~single]
     cells = cut(spheres[many])
-    if cells is not None and cells.crowd > CROWD:
-        cells = None
-    return SphereLayout(numbers[single], many, cells)
+    crowd = np.inf if cells is None else cells.crowd
+    if len(many) <= min(CROWDED_LIMIT, SPHERE_LIMIT * max(1, crowd - 1)):
+        return one_by_one
+    return SphereLayout(numbers[single], many, cells if crowd <= CROWD else None)
