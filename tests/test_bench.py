@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from math import nan
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,9 +23,6 @@ from benchmarks.bench.scenes import Configuration, ball_pit, lanterns, resized, 
 from benchmarks.bench.targets import Target, targets
 from drpt import Mode, Scene, load_scene, render
 from drpt.crosscheck.estimate import Estimate
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ROUNDING = 1e-12
 """Of float64, in a few operations."""
@@ -144,6 +144,16 @@ def test_lights_can_be_chosen_alike() -> None:
 def test_uniform_choice_notices_that_nothing_asks_for_it() -> None:
     with pytest.raises(RuntimeError, match="LightTree"), uniform_choice():
         pass
+
+
+def test_kernels_of_a_run_are_its_own() -> None:
+    """The folder for them is chosen before Dr.Jit is loaded, which looks for it then."""
+    code = "import sys, benchmarks.bench.__main__; print('drjit' in sys.modules)"
+    root = Path(__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "False"
 
 
 @pytest.fixture

@@ -13,8 +13,6 @@ from benchmarks.bench.scenes import lanterns, resized
 from benchmarks.bench.timing import alternate, median_seconds, start
 from drpt import Mode, Scene, load_scene
 from drpt.crosscheck import measure
-from drpt.kernel import device_scene, light_tree
-from drpt.kernel.launch import forget
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,10 +54,13 @@ def uniform_choice() -> Iterator[None]:
     The kernels stay the same, and so does their time; what changes is the even share of each
     choice. Raises `RuntimeError` where nothing has chosen by it.
     """
-    kept = light_tree.LightTree
-    made: list[light_tree.LightTree] = []
+    from drpt.kernel import device_scene, light_tree
+    from drpt.kernel.launch import forget
 
-    def even(*arguments: Any) -> light_tree.LightTree:
+    kept = light_tree.LightTree
+    made: list[Any] = []
+
+    def even(*arguments: Any) -> Any:
         made.append(kept(*arguments))
         return made[-1]
 
