@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from drpt.kernel.cells import LINKS, LONGEST, Cells, cut, rows_of
+from drpt.kernel.cells import LINKS, LONGEST, SLACK, Cells, cut, rows_of
 from drpt.kernel.spheres import CROWD, CROWDED_LIMIT, SPHERE_LIMIT, STANDOUTS, lay_out
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def test_rows_of_a_cell_are_linked() -> None:
             found.append(7 + x % 256 + y % 256 * 256 + z % 256 * 256**2)
             assert rows.numbers[row] == found[-1]
             sphere = spheres[numbers == found[-1]]
-            assert (rows.spheres[row] == cells.local(sphere)).all()
+            assert (rows.spheres[row] == sphere).all()
             row = int(rows.words[row, 3]) % LINKS
         assert found == expected
 
@@ -83,16 +83,17 @@ def test_rows_of_a_cell_are_linked() -> None:
 def test_words_tell_balls_in_which_spheres_lie(radius: float, around: float) -> None:
     spheres = scattered(40, 1) * (radius, radius, radius, radius / 10)
     spheres[:, :3] += around * radius
-    rows = rows_of(cells_of(spheres), spheres, 0xABCDEF * np.arange(40) // 40)
+    cells = cells_of(spheres)
+    rows = rows_of(cells, spheres, 0xABCDEF * np.arange(40) // 40)
     used = rows.words[:, 3] > 0
     centers = rows.words[used, :3].copy().view(np.float32).astype(float)
     above = (rows.words[used, 3] // LINKS * 2**23).view(np.float32).astype(float)
-    sphere = rows.spheres[used]
+    sphere = cells.local(rows.spheres[used])
     moved = np.linalg.norm(centers - sphere[:, :3], axis=1)
-    assert (moved[1:] > 0).any()
-    assert (above >= np.square(moved + sphere[:, 3])).all()
+    assert (moved > 0).sum() > 30
+    assert (above >= (1 + SLACK) * np.square(moved + sphere[:, 3])).all()
     reach = sphere[:, 3] + 2.0**-15 * np.linalg.norm(sphere[:, :3], axis=1)
-    assert (above <= 2.01 * np.square(reach)).all()
+    assert (above <= 2.01 * (1 + SLACK) * np.square(reach)).all()
 
 
 def test_spheres_that_all_lie_in_each_other_have_no_cells() -> None:

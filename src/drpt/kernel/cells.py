@@ -24,6 +24,11 @@ ROOM = 2.0**-14
 That is twice what a ray's distances to cells' sides are off, as sums of up to `LONGEST` terms, if
 it starts at the grid.
 """
+SLACK = 1 / 4
+"""By which squares of radii are larger, so that as many more squares of rounding are room for it.
+
+That is (r + δ)² ≤ (1 + ε) r² + (1 + 1/ε) δ².
+"""
 FAR = 2.0**30
 """How far from the origin spheres are at the most, relative to the grid, for float64."""
 LINKS = 2**24
@@ -132,9 +137,9 @@ class Rows(NamedTuple):
 
     ``words`` (n, 4) are the bits of a sphere's centre, the last of each coordinate a digit of its
     mark, and a word: the exponent of a power of two that is above the square of the radius around
-    there, and the number of the row where there is another one in the same cell, or 0. Those of
-    cells that have no sphere are 0. ``spheres`` (n, 4) are the spheres as they are, relative to
-    the grid's centre, and ``numbers`` (n,) theirs.
+    there, by `SLACK`, and the number of the row where there is another one in the same cell, or 0.
+    Those of cells that have no sphere are 0. These centres are relative to the grid's; ``spheres``
+    (n, 4) are the spheres as they are, and ``numbers`` (n,) theirs.
 
     A mark is a sphere's number, counted from the first one. There are fewer than `LINKS` of them,
     as there are more rows than that.
@@ -147,14 +152,13 @@ class Rows(NamedTuple):
 
 def rows_of(cells: Cells, spheres: Array, numbers: Ints) -> Rows:
     """Rows of all cells, each with the first sphere in it, then those of the other ones."""
-    spheres = cells.local(spheres)
     first = np.diff(cells.cell, prepend=-1) > 0
     others = len(first) - first.sum()
     row = cells.cell.copy()
     row[~first] = cells.total + np.arange(others)
     link = np.append(np.where(first[1:], 0, row[1:]), 0)
     words = np.zeros((cells.total + others, 4), np.uint32)
-    words[row] = _words(spheres, numbers - numbers[0])[cells.sphere]
+    words[row] = _words(cells.local(spheres), numbers - numbers[0])[cells.sphere]
     words[row, 3] += link.astype(np.uint32)
     in_row = np.zeros(len(words), np.intp)
     in_row[row] = cells.sphere
@@ -169,5 +173,5 @@ def _words(spheres: Array, marks: Ints) -> NDArray[np.uint32]:
     bits ^= ((bits ^ digits) % 2**DIGIT_BITS).astype(np.uint32)
     # A digit and rounding change a coordinate by less than a unit of the place before the digit.
     moved = 2.0 ** (DIGIT_BITS - _MANTISSA_BITS) * np.linalg.norm(centers, axis=1)
-    _, exponents = np.frexp(np.square(radii + moved) * (1 + ROOM))
+    _, exponents = np.frexp(np.square(radii + moved) * (1 + SLACK))
     return np.column_stack([bits, (exponents + _EXPONENT_OF_1) * LINKS]).astype(np.uint32)

@@ -254,17 +254,11 @@ def _sphere_facts(primitives: Primitives) -> dict[str, Fact]:
         *_lit(primitives),
         (len(many) > 0, f"{_number(spheres, 'sphere')}, few enough to be met one by one"),
     )
-    told = f"{spheres} spheres{alone}"
+    told = f"{spheres} spheres{alone}, too many to be met one by one"
     return {
-        "sphere_grid": _decide(
-            f"{told}, too many to be met one by one",
-            *needs,
-            (cells is not None, "they are crowded"),
-        ),
+        "sphere_grid": _decide(told, *needs, (cells is not None, "they are crowded")),
         "sphere_tree": _decide(
-            f"{told}, too many to be met one by one, and crowded",
-            *needs,
-            (cells is None, "they are not crowded"),
+            f"{told}, and crowded", *needs, (cells is None, "they are not crowded")
         ),
     }
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import drjit as dr
 
 from drpt.kernel.camera import Ray
-from drpt.kernel.cells import DIGIT_BITS, LINKS, rows_of
+from drpt.kernel.cells import DIGIT_BITS, LINKS, SLACK, rows_of
 from drpt.kernel.meet import Ball, meet_box, meet_sphere
 from drpt.kernel.vec import gather_row, lesser, types_of, vec3
 
@@ -33,7 +33,10 @@ if TYPE_CHECKING:
     Ints = NDArray[np.intp]
 
 AFAR = 2.0**-20
-"""By which a walk starts before the grid, and a ray may miss it, relative to the distance there."""
+"""By which a walk starts before the grid, and a ray may miss it, relative to the distance there.
+
+Rounding moves no ray by more.
+"""
 BEFORE = 1 / 4
 """By which it starts before the grid at the most, relative to the size of that.
 
@@ -134,27 +137,28 @@ class SphereGrid:
     ) -> tuple[Float, UInt32]:
         """As all `ManySpheres` do.
 
-        Distances are measured from where the ray enters the grid, and coordinates from its centre,
-        so that from afar the cells are where the spheres are.
+        On the way distances are measured from where the ray enters the grid, and coordinates from
+        its centre, so that from afar the cells are where the spheres are.
         """
         origin = ray.origin - self._center
         near, far = self._span(Ray(origin, ray.direction))
         active = active & (near <= lesser(far * (1 + AFAR), end)) & (near < dr.inf)
         start = dr.select(active, near - lesser(near * AFAR, self._size * BEFORE), 0)
-        ray = Ray(dr.fma(ray.direction, start, origin), ray.direction)
-        enters, leaves = self._span(ray)
+        way = Ray(dr.fma(ray.direction, start, origin), ray.direction)
+        enters, leaves = self._span(way)
         active &= enters < self._size
-        cell, course = self._enter(ray, leaves)
+        cell, course = self._enter(way, leaves)
+        room = (1 + 1 / SLACK) * dr.square(AFAR * (start + self._size))
         digits = None if but is None else self._digits(but)
 
         def step(place: Any, end: Float, found: UInt32, *state: Any) -> tuple[Any, ...]:
             cell, cursors = _Cell(*place), [_Cursor(*cursor) for cursor in state]
-            looks = [self._look(cursor.row, ray, digits) for cursor in cursors]
+            looks = [self._look(cursor.row, way, room, digits) for cursor in cursors]
 
             def meet(end: Float, found: UInt32) -> tuple[Float, UInt32]:
                 for cursor, look in zip(cursors, looks, strict=True):
                     number, met, t = self._meet(cursor.row, ray, look.close)
-                    end, found = visit(number, met, start + t, end, found)
+                    end, found = visit(number, met, t, end, found)
                 return end, found
 
             any_close = reduce(or_, (look.close for look in looks))
@@ -196,15 +200,18 @@ class SphereGrid:
         mark = dr.minimum(number - self._first, LINKS - 1)
         return types_of(number).Array3u(mark, mark >> DIGIT_BITS, mark >> 2 * DIGIT_BITS)
 
-    def _look(self, row: UInt32, ray: Ray, but: Array3u | None) -> _Look:
-        """Look at a row; spheres whose coordinates end with the digits ``but`` are not close."""
+    def _look(self, row: UInt32, ray: Ray, room: Float, but: Array3u | None) -> _Look:
+        """Look at a row; spheres whose coordinates end with the digits ``but`` are not close.
+
+        There is so much ``room``, a square, for what rounding moves rays by.
+        """
         types = types_of(ray.origin.x)
         x, y, z, word = gather_row(self._words, row, 4)
         bits = (x, y, z, (word >> 1) & _EXPONENT)
         numbers: Any = [dr.reinterpret_array(types.Float32, number) for number in bits]
         spoke = ray.origin - vec3(*numbers[:3])
         aside = dr.fma(ray.direction, -dr.dot(spoke, ray.direction), spoke)
-        close = dr.squared_norm(aside) < numbers[3]
+        close = dr.squared_norm(aside) - room < numbers[3]
         if but is not None:
             differ = (x ^ but.x) | (y ^ but.y) | (z ^ but.z)
             close &= (differ & (2**DIGIT_BITS - 1)) != 0
