@@ -24,7 +24,7 @@ ROOM = 2.0**-14
 That is twice what a ray's distances to cells' sides are off, as sums of up to `LONGEST` terms, if
 it starts at the grid.
 """
-SLACK = 1 / 4
+SLACK = 1 / 16
 """By which squares of radii are larger, so that as many more squares of rounding are room for it.
 
 That is (r + δ)² ≤ (1 + ε) r² + (1 + 1/ε) δ².
