@@ -15,17 +15,18 @@ import drpt
 PACKAGE = Path(drpt.__file__).parent
 
 KNOWS: dict[str, set[str]] = {
-    "scene": set(),
+    "files": set(),
+    "scene": {"files"},
     "kernel": {"scene"},
     "film": set(),
     "error": set(),
-    "output": set(),
+    "output": {"files"},
     "plan": set(),
     "denoise": set(),
     "notebook": {"output"},
     "settings": {"kernel", "scene"},
     "stopping": {"settings"},
-    "checkpoint": {"output"},
+    "checkpoint": {"files"},
     "result": {"denoise", "error", "kernel", "notebook", "output", "scene"},
     "progress": set(),
 }

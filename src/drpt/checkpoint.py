@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drpt.output import replacing
+from drpt.files import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -16,10 +16,10 @@ import numpy as np
 
 from drpt.checkpoint import Checkpoint
 from drpt.error import squared_differences
+from drpt.files import check_file
 from drpt.film import Film
 from drpt.kernel import backend
 from drpt.kernel.estimator import SHARING_SPP, Mode, feature_facts, layout_facts
-from drpt.output import check_file
 from drpt.plan import parts, plan_passes, run_length
 from drpt.progress import with_bar
 from drpt.result import SAMPLES, Result

@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 from typing import Any
 
@@ -189,17 +190,18 @@ def test_bad_mesh_files_name_both_files(tmp_path: Path) -> None:
 def test_bad_paths(tmp_path: Path) -> None:
     assert "there is no such file" in refusal(tmp_path / "no.toml")
     assert "there is no such file" in refusal("no.toml")
-    assert "Is a directory" in refusal(tmp_path)
+    assert "this is a folder, and it must be a file" in refusal(tmp_path)
     assert "null" in refusal("a\0.toml")
     (tmp_path / "latin.toml").write_bytes('description = "é"'.encode("latin-1"))
     assert "byte 15 is not UTF-8" in refusal(tmp_path / "latin.toml")
 
 
 def test_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(self: Path) -> bytes:
+    def fail(*_: object) -> int:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", fail)  # root may read everything
+    (tmp_path / "secret.toml").touch()
+    monkeypatch.setattr(os, "open", fail)  # root may read everything
     assert "it cannot be read: Permission denied" in refusal(tmp_path / "secret.toml")
 
 

@@ -244,7 +244,7 @@ def test_bad_paths(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="no such file"):
         load_mesh(tmp_path / "no.obj")
     (tmp_path / "folder.obj").mkdir()
-    with pytest.raises(SceneError, match="Is a directory"):
+    with pytest.raises(SceneError, match="this is a folder"):
         load_mesh(tmp_path / "folder.obj")
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from drpt.cli.interrupts import interrupts_noted
 from drpt.cli.status import STATUSES, TERMINATED, bad_input
+from drpt.files import check_file
 from drpt.kernel import backend
-from drpt.output import check_file
 
 if TYPE_CHECKING:
     import argparse

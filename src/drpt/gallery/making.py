@@ -6,11 +6,11 @@ from pathlib import Path
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING
 
+from drpt.files import replacing
 from drpt.gallery.figures import course_plan
 from drpt.gallery.page import Page
 from drpt.gallery.questions import QUESTIONS
 from drpt.gallery.rendering import Darkroom
-from drpt.output import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Callable

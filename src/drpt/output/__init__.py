@@ -1,8 +1,8 @@
 """Pictures on disk: EXR, PNG and NPY, each written whole or not at all."""
 
+from drpt.files import check_file, replacing
 from drpt.output.display import CURVES, to_display
 from drpt.output.exr import read_exr, read_exr_layers
-from drpt.output.files import check_file, replacing
 from drpt.output.pictures import READABLE, SUFFIXES, check_target, read, write, write_png
 
 __all__ = [

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
+from drpt.files import check_file, replacing
 from drpt.output.display import check_look, to_display
 from drpt.output.exr import read_exr_layers, to_header, write_exr
-from drpt.output.files import check_file, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

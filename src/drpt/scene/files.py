@@ -18,6 +18,7 @@ from drpt.scene import checks
 from drpt.scene.builtin import builtin_names, builtin_path
 from drpt.scene.checks import SceneError
 from drpt.scene.model import Camera, Diffuse, Material, Mesh, Phong, Scene, Shape, Sphere
+from drpt.scene.reading import read_file
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -27,6 +28,8 @@ Table = dict[str, Any]
 """A TOML table."""
 
 MATERIALS: dict[str, type[Material]] = {"diffuse": Diffuse, "phong": Phong}
+MAX_BYTES = 2**26
+"""Largest scene file: a mesh of a million vertices fits, and it takes a minute to parse."""
 SURFACE = ("material", "radiance")
 
 
@@ -58,12 +61,9 @@ def _find(name_or_path: str | PathLike[str]) -> Path:
 
 
 def _read_toml(path: Path) -> Table:
+    content = read_file(path, MAX_BYTES)
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except FileNotFoundError:
-        raise SceneError("there is no such file") from None
-    except OSError as error:
-        raise SceneError(f"it cannot be read: {error.strerror}") from None
+        return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise SceneError(f"it is not TOML: byte {error.start} is not UTF-8") from None
     except (ValueError, RecursionError) as error:

@@ -19,6 +19,7 @@ import numpy as np
 
 from drpt.scene import checks
 from drpt.scene.checks import SceneError
+from drpt.scene.reading import read_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -31,6 +32,10 @@ OBJ_CORNER = re.compile(r"(I)(?:/(?:I)?(?:/(I))?)?".replace("I", "-?[0-9]{1,18}"
 OBJ_IGNORED = ("g", "l", "mg", "mtllib", "o", "p", "s", "usemtl", "vp", "vt")
 """Keywords of an OBJ file that take no part in what a mesh is here."""
 SAME_SIZE = "in a binary PLY file all faces must have the same number of vertices"
+
+
+MAX_BYTES = 2**32
+"""Largest mesh file: 50 million vertices take 2 GB as an OBJ, and their arrays as much."""
 
 
 class MeshArrays(NamedTuple):
@@ -54,20 +59,9 @@ def load_mesh(path: str | PathLike[str]) -> MeshArrays:
         read = {".obj": _read_obj, ".ply": _read_ply, ".npz": _read_npz}.get(path.suffix.lower())
         if read is None:
             raise SceneError("this is not a mesh file; it must end in .obj, .ply or .npz")
-        return read(_read_bytes(path))
+        return read(read_file(path, MAX_BYTES))
     except SceneError as error:
         raise error.in_file(str(path)) from None
-
-
-def _read_bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise SceneError("there is no such file") from None
-    except OSError as error:
-        raise SceneError(f"it cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a null character in the path
-        raise SceneError(f"it cannot be read: {error}") from None
 
 
 def _read_npz(content: bytes) -> MeshArrays:
