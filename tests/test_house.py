@@ -15,8 +15,9 @@ import drpt
 PACKAGE = Path(drpt.__file__).parent
 
 KNOWS: dict[str, set[str]] = {
-    "files": set(),
-    "scene": {"files"},
+    "messages": set(),
+    "files": {"messages"},
+    "scene": {"files", "messages"},
     "kernel": {"scene"},
     "film": set(),
     "error": set(),

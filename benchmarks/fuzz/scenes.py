@@ -9,7 +9,7 @@ import tomli_w
 
 from benchmarks.fuzz.mutations import HUGE, NUMBERS, mutate_bytes, mutate_words
 from benchmarks.fuzz.target import Target
-from drpt.scene import checks, files, model
+from drpt.scene import checks, files, model, toml
 from drpt.scene.checks import SceneError
 from drpt.scene.files import load_scene
 
@@ -115,5 +115,5 @@ def _with_value(text: str, random: Random) -> str:
 
 
 TARGET = Target(
-    "scenes", ".toml", make, load_scene, (SceneError,), files._scene, (files, checks, model)
+    "scenes", ".toml", make, load_scene, (SceneError,), files._scene, (files, toml, checks, model)
 )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import drpt
-from drpt.files import in_words, open_regular, read_bytes
+from drpt.files import open_regular, read_bytes
 from drpt.scene.files import MAX_BYTES
 
 if TYPE_CHECKING:
@@ -72,11 +72,3 @@ def test_a_large_file_is_not_read(tmp_path: Path) -> None:
 def test_a_null_in_a_name_is_an_error_of_the_system() -> None:
     with pytest.raises(OSError, match="null character"):
         open_regular("a\0b")
-
-
-@pytest.mark.parametrize(
-    ("size", "words"),
-    [(0, "0 bytes"), (999, "999 bytes"), (1000, "1 kB"), (2**30, "1.074 GB"), (10**22, "1e+04 EB")],
-)
-def test_sizes_are_told_in_units(size: int, words: str) -> None:
-    assert in_words(size) == words

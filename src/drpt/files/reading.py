@@ -7,7 +7,7 @@ import os
 import stat
 from typing import TYPE_CHECKING
 
-from drpt.files.sizes import in_words
+from drpt.messages import size_in_words
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -49,7 +49,9 @@ def read_bytes(path: Path, most: int) -> bytes:
         content = b"" if size > most else stream.read(most + 1)
     size = max(size, len(content))
     if size > most:
-        problem = f"it has {in_words(size)}, and it must have no more than {in_words(most)}"
+        problem = (
+            f"it has {size_in_words(size)}, and it must have no more than {size_in_words(most)}"
+        )
         raise OSError(errno.EFBIG, problem, os.fspath(path))
     return content
 

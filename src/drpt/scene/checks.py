@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard, TypeVar
 
 import numpy as np
 
+from drpt.messages import one_line, shortened
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
@@ -32,6 +34,10 @@ MAX_PIXELS = 65536
 """Largest width and height of a picture."""
 MAX_SHOWN = 60
 """Characters of a wrong value that an error shows."""
+MAX_FIELD = 200
+"""Characters of a field that an error names: keys of a file may have any length."""
+MAX_SOURCE = 400
+"""Likewise of the path of a file."""
 
 
 def plain(value: float) -> str:
@@ -56,7 +62,8 @@ class SceneError(ValueError):
         self.problem = problem
         self.field = field
         self.source = source
-        super().__init__(_one_line(": ".join(part for part in (source, field, problem) if part)))
+        where = shortened(source, MAX_SOURCE), shortened(field, MAX_FIELD)
+        super().__init__(one_line(": ".join(part for part in (*where, problem) if part)))
 
     def within(self, parent: str) -> SceneError:
         """Return the same error, seen from the field `parent` that holds this one."""
@@ -106,7 +113,7 @@ def show(value: object) -> str:
     """Return `value` as one short line."""
     item = value.item() if isinstance(value, np.generic) else value
     try:
-        text = _one_line(repr(item))
+        text = one_line(repr(item))
     except ValueError:  # Python refuses to print integers of thousands of digits
         text = f"this {type(item).__name__}"
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
@@ -223,7 +230,3 @@ def _refuse_first_bad_row(
 
 def _refuse_text(field: str, text: str, allowed: str) -> SceneError:
     return SceneError(f"{text} is not allowed; it must be {allowed}", field)
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import difflib
 import os
-import tomllib
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drpt.messages import shortened
 from drpt.scene import checks
 from drpt.scene.builtin import builtin_names, builtin_path
 from drpt.scene.checks import SceneError
 from drpt.scene.model import Camera, Diffuse, Material, Mesh, Phong, Scene, Shape, Sphere
 from drpt.scene.reading import read_file
+from drpt.scene.toml import parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -30,6 +31,8 @@ Table = dict[str, Any]
 MATERIALS: dict[str, type[Material]] = {"diffuse": Diffuse, "phong": Phong}
 MAX_BYTES = 2**26
 """Largest scene file: a mesh of a million vertices fits, and it takes a minute to parse."""
+MAX_LIST = 300
+"""Characters of a list of names in an error."""
 SURFACE = ("material", "radiance")
 
 
@@ -41,7 +44,7 @@ def load_scene(name_or_path: str | PathLike[str]) -> Scene:
     """
     path = _find(name_or_path)
     try:
-        return _scene(_read_toml(path), path.parent)
+        return _scene(parse_toml(read_file(path, MAX_BYTES)), path.parent)
     except SceneError as error:
         raise error.in_file(str(path)) from None
 
@@ -58,16 +61,6 @@ def _find(name_or_path: str | PathLike[str]) -> Path:
     if name and os.path.exists(path):  # unlike Path.exists, False where a name is too long
         return path
     raise _unknown("", "scene", name, builtin_names(), "the path of a scene file")
-
-
-def _read_toml(path: Path) -> Table:
-    content = read_file(path, MAX_BYTES)
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise SceneError(f"it is not TOML: byte {error.start} is not UTF-8") from None
-    except (ValueError, RecursionError) as error:
-        raise SceneError(f"it is not TOML: {error}") from None
 
 
 def _scene(scene: Table, folder: Path) -> Scene:
@@ -173,15 +166,17 @@ def _unknown(
 
     What else is allowed is said by `otherwise`.
     """
-    close = difflib.get_close_matches(str(value), known, n=1)
-    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    close = []
+    if isinstance(value, str) and len(value) <= MAX_LIST:  # longer ones take long
+        close = difflib.get_close_matches(value, known, n=1)
+    hint = f" (did you mean {checks.show(close[0])}?)" if close else ""
     listed = f"one of {_list(known)}" if known else ""
     allowed = " or ".join(filter(None, (listed, otherwise)))
     return SceneError(f"there is no {what} {checks.show(value)}{hint}; it must be {allowed}", field)
 
 
 def _list(names: Collection[str]) -> str:
-    return ", ".join(names)
+    return shortened(", ".join(names), MAX_LIST)
 
 
 def _field_names(model: type[Camera | Material]) -> tuple[str, ...]:
