@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from importlib.metadata import version as version_of
 from typing import TYPE_CHECKING
 
 from drpt.cli import COMMANDS
 from drpt.cli.parser import Parser
+from drpt.distribution import VERSION
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 project = "drpt"
 author = copyright = "the drpt authors"
-version = release = version_of("drpt")
+version = release = VERSION
 
 extensions = [
     "myst_parser",

@@ -7,7 +7,6 @@ metadata says how it was made. All of them take a quarter of an hour on two core
 from __future__ import annotations
 
 import argparse
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 
@@ -16,6 +15,7 @@ from drpt.crosscheck import reference
 from drpt.crosscheck.references import MITSUBA
 from drpt.crosscheck.stored import save_estimate
 from drpt.crosscheck.variant import VARIANT
+from drpt.distribution import versions
 from drpt.scene.builtin import builtin_names
 from drpt.scene.saving import to_toml
 
@@ -58,7 +58,7 @@ def make(name: str, bounces: int) -> None:
         "sampler": "independent",
         "bounces": bounces,
         "seed": bounces,
-        **{package: version(package) for package in ("mitsuba", "drjit", "drpt")},
+        **versions("mitsuba", "drjit"),
         "scene": to_toml(scene),
     }
     estimate = reference(scene, SPP, bounces, seed=bounces)

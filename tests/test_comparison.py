@@ -12,6 +12,7 @@ from PIL import Image
 from drpt import comparison
 from drpt.comparison import compare, differing_settings
 from drpt.crosscheck.flip import has_flip
+from drpt.distribution import install_command
 from drpt.output import read_exr
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ class TestNumbers:
         monkeypatch.setattr(comparison, "has_flip", lambda: False)
         found = compare(flat(1, 1, 1), flat(0, 0, 0))
         assert found.flip is None
-        assert "FLIP        not computed (pip install 'drpt[flip]' adds it)" in str(found)
+        assert f"FLIP        not computed ({install_command('flip')} adds it)" in str(found)
 
     def test_are_printed(self) -> None:
         lines = str(compare(flat(0.5, 0.2, 0.3), flat(0.3, 0.3, 0.3))).splitlines()

@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+import drpt
 from drpt import doctor, machine
+from drpt.distribution import NAME, install_command
 from drpt.kernel import backend, llvm
 
 if TYPE_CHECKING:
@@ -181,10 +183,34 @@ class TestPackages:
     def test_that_are_optional_tell_how_to_install_them(
         self, examine: Callable[..., doctor.Report], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(doctor, "EXTRAS", {"no-such-package": "magic"})
+        packages = ("numpy", "no-such-package", "nor-this")
+        monkeypatch.setattr(doctor, "EXTRAS", {"magic": packages})
         report = examine()
-        says = ["not installed (python -m pip install 'drpt[magic]' does)"]
-        assert found_as(report, "no-such-package") == says
+        does = install_command("magic")
+        says = [f"no-such-package and nor-this not installed ({does} does)"]
+        assert found_as(report, "drpt-render[magic]") == says
+        assert report.problems == []
+
+    def test_of_every_extra_are_listed(self, examine: Callable[..., doctor.Report]) -> None:
+        rows = [row for row, _ in examine().rows]
+        assert [row for row in rows if row.startswith(f"{NAME}[")] == [
+            "drpt-render[denoise]",
+            "drpt-render[flip]",
+            "drpt-render[notebook]",
+            "drpt-render[view]",
+        ]
+
+    def test_of_an_extra_have_versions(self, examine: Callable[..., doctor.Report]) -> None:
+        says = [f"starlette {version('starlette')}, uvicorn {version('uvicorn')}, "]
+        says += [f"websockets {version('websockets')}"]
+        assert found_as(examine(), "drpt-render[view]") == ["".join(says)]
+
+    def test_are_unknown_where_the_source_runs_without_being_installed(
+        self, examine: Callable[..., doctor.Report], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(doctor, "NAME", "no-such-package")
+        report = examine()
+        assert found_as(report, "no-such-package") == [drpt.__version__]
         assert report.problems == []
 
     @pytest.mark.parametrize(("there", "is_"), [("1.4.0", "1.4.0"), (None, "not installed")])
@@ -195,11 +221,35 @@ class TestPackages:
         examine: Callable[..., doctor.Report],
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        monkeypatch.setattr(doctor, "_version", lambda name: there if name == "drjit" else "1")
+        others = {"drjit": there, "drpt": None}
+        monkeypatch.setattr(doctor, "_version", lambda name: others.get(name, "1"))
         needs = ["drjit==1.5.0", "scipy<2,>=1.15", "oidn<1; extra == 'denoise'"]
         monkeypatch.setattr(doctor, "requires", lambda _: needs)
         does = "python -m pip install drjit==1.5.0"
         assert examine().problems == [f"drjit is {is_}, and drpt needs 1.5.0: {does}"]
+
+
+class TestNamesake:
+    ADVICE = "python -m pip uninstall drpt && "
+
+    @pytest.fixture(autouse=True)
+    def installed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(doctor, "_version", lambda name: "9.1" if name == "drpt" else "1")
+        monkeypatch.setattr(doctor, "requires", lambda _: [])
+
+    def test_is_noted(self, examine: Callable[..., doctor.Report]) -> None:
+        report = examine()
+        (note,) = report.notes
+        assert note.startswith("the distribution drpt 9.1 is not drpt-render, but installs")
+        assert note.endswith(self.ADVICE + install_command("", "--force-reinstall", "--no-deps"))
+        assert report.problems == []
+
+    def test_that_has_replaced_files_is_a_problem(
+        self, examine: Callable[..., doctor.Report], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.delattr(drpt, "Scene")
+        (problem,) = examine().problems
+        assert problem.startswith("the distribution drpt 9.1 is not drpt-render, but installs")
 
 
 class TestPixel:

@@ -13,6 +13,6 @@ pip=("$scratch/venv/bin/python" -m pip --disable-pip-version-check --quiet)
 "${pip[@]}" install . --group dev hatchling editables
 {
   echo "# The exact versions that are developed and tested with; written by \`make lock\`."
-  "${pip[@]}" freeze --all --exclude drpt --exclude setuptools
+  "${pip[@]}" freeze --all --exclude drpt-render --exclude setuptools
 } >"$scratch/constraints.txt"
 mv "$scratch/constraints.txt" constraints.txt

@@ -75,8 +75,14 @@ install_drpt() {
   local pip=("$venv/bin/python" -m pip --disable-pip-version-check --quiet)
   local hint="pip could not install everything, see above"
   "${pip[@]}" install --constraint constraints.txt --upgrade pip || fail "$hint"
+  remove_namesake || fail "$hint"
   "${pip[@]}" install --constraint constraints.txt --build-constraint constraints.txt \
     --editable . --group dev || fail "$hint"
+}
+
+# A distribution called drpt, as this one once was, would leave its files among those of drpt-render.
+remove_namesake() {
+  ! "${pip[@]}" show drpt >/dev/null 2>&1 || "${pip[@]}" uninstall --yes drpt
 }
 
 # --- system libraries: LLVM, and what Dr.Jit's wheel is linked to ---------------------------------

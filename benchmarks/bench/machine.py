@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import platform
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from drpt import distribution
 from drpt.kernel import backend
 
-PACKAGES = ("drpt", "drjit", "mitsuba", "numpy")
+PACKAGES = ("drjit", "mitsuba", "numpy")
 CPU_INFO = Path("/proc/cpuinfo")
 
 
@@ -30,7 +30,7 @@ def machine() -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Versions of Python and of what computes."""
-    return {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
+    return {"python": platform.python_version(), **distribution.versions(*PACKAGES)}
 
 
 def cpu_model(cpu_info: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from benchmarks.bench.metrics import own_rel_mse
 from drpt import Mode
 from drpt.crosscheck import measure
 from drpt.crosscheck.estimate import PASSES, Estimate
+from drpt.distribution import versions
 from drpt.scene.saving import to_toml
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def reference(configuration: Configuration, spp: int, folder: Path) -> Estimate:
             "mode": Mode.MIS,
             "sampler": "sobol",
             "seed": SEED,
-            "drpt": version("drpt"),
+            **versions(),
             "rel_mse": own_rel_mse(estimate),
             "scene": scene,
         }

@@ -1,7 +1,6 @@
 """drpt: a small, fast, exact path tracer on Dr.Jit."""
 
-from importlib.metadata import version
-
+from drpt.distribution import VERSION
 from drpt.render import (
     Explanation,
     Mode,
@@ -40,4 +39,4 @@ __all__ = [
     "render",
 ]
 
-__version__ = version("drpt")
+__version__ = VERSION

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drpt.crosscheck.colours import colour_end, signed_colours
-from drpt.crosscheck.flip import INSTALL, has_flip, mean_flip
+from drpt.crosscheck.flip import has_flip, mean_flip
+from drpt.distribution import install_command
 from drpt.error import DARK
 from drpt.output import write
 
@@ -78,17 +79,21 @@ class Comparison:
         write(path, shown.astype(np.float32), {})
 
     def __str__(self) -> str:
-        flip = f"not computed ({INSTALL} adds it)" if self.flip is None else f"{self.flip:.4f}"
         means = zip("RGB", self.mean_difference, strict=True)
         rows = {
             "relMSE": f"{self.rel_mse:.3g}",
             "RMSE": f"{self.rmse:.3g}",
-            "FLIP": flip,
+            "FLIP": self._flip_row(),
             "means": ", ".join(f"{channel} {100 * value:+.3g} %" for channel, value in means),
         }
         if any(self.non_finite):
             rows["not finite"] = "{} and {} pixels".format(*self.non_finite)
         return "\n".join(f"  {name:10}  {value}" for name, value in rows.items())
+
+    def _flip_row(self) -> str:
+        if self.flip is None:
+            return f"not computed ({install_command('flip')} adds it)"
+        return f"{self.flip:.4f}"
 
 
 def compare(image: ArrayLike, reference: ArrayLike) -> Comparison:

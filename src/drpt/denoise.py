@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from drpt.distribution import install_command
+
 if TYPE_CHECKING:
     from types import ModuleType
 
@@ -24,7 +26,7 @@ def load_denoiser() -> ModuleType:
     try:
         return import_module("mitsuba_oidn")
     except ImportError as error:
-        install = "python -m pip install 'drpt[denoise]' installs it"
+        install = f"{install_command('denoise')} installs it"
         raise ImportError(f"denoise: it needs Open Image Denoise ({error}); {install}") from error
 
 

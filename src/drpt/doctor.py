@@ -10,7 +10,9 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+import drpt
 from drpt import machine
+from drpt.distribution import EXTRAS, NAME, VERSION, install_command
 from drpt.kernel import backend, llvm
 from drpt.render import render
 from drpt.scene import Camera, Diffuse, Mesh, Scene, Sphere
@@ -18,9 +20,7 @@ from drpt.scene import Camera, Diffuse, Mesh, Scene, Sphere
 if TYPE_CHECKING:
     from pathlib import Path
 
-PACKAGES = ("drpt", "drjit", "mitsuba", "numpy", "OpenEXR")
-EXTRAS = {"mitsuba-oidn": "denoise", "flip-evaluator": "flip"}
-"""Optional packages, and the extras that install them."""
+PACKAGES = ("drjit", "mitsuba", "numpy", "OpenEXR")
 TOLERANCE = 1e-3
 """Of the self-test, whose estimator has no noise: far above what float32 rounds."""
 
@@ -65,6 +65,8 @@ def report() -> Report:
     if chosen is not None:
         _look_at_cache(found, chosen)
     _look_at_packages(found)
+    _look_at_extras(found)
+    _look_at_namesake(found)
     if chosen is not None:
         _render_pixel(found)
     return found
@@ -151,18 +153,48 @@ def _look_at_cache(found: Report, chosen: backend.Backend) -> None:
 
 def _look_at_packages(found: Report) -> None:
     found.rows.append(("Python", f"{platform.python_version()} ({sys.executable})"))
+    found.rows.append((NAME, VERSION))
     for name in PACKAGES:
         found.rows.append((name, _version(name) or "not installed"))
-    for name, extra in EXTRAS.items():
-        missing = f"not installed (python -m pip install 'drpt[{extra}]' does)"
-        found.rows.append((name, _version(name) or missing))
-    for requirement in requires("drpt") or ():
+    for requirement in _requirements():
         name, _, pinned = requirement.partition(";")[0].strip().partition("==")
         if pinned and _version(name) != pinned:
             found.problems.append(
                 f"{name} is {_version(name) or 'not installed'}, and drpt needs {pinned}: "
                 f"python -m pip install {name}=={pinned}"
             )
+
+
+def _look_at_extras(found: Report) -> None:
+    for extra, packages in EXTRAS.items():
+        there = {name: _version(name) for name in packages}
+        missing = [name for name, installed in there.items() if installed is None]
+        if missing:
+            says = f"{' and '.join(missing)} not installed ({install_command(extra)} does)"
+        else:
+            says = ", ".join(f"{name} {installed}" for name, installed in there.items())
+        found.rows.append((f"{NAME}[{extra}]", says))
+
+
+def _look_at_namesake(found: Report) -> None:
+    """Look for a distribution that is named as the import: its files take the place of drpt's."""
+    other = _version("drpt")
+    if other is None:
+        return
+    intact = getattr(drpt, "Scene", None) is Scene
+    again = install_command("", "--force-reinstall", "--no-deps")
+    (found.notes if intact else found.problems).append(
+        f"the distribution drpt {other} is not {NAME}, but installs files of the same names: "
+        f"python -m pip uninstall drpt && {again}"
+    )
+
+
+def _requirements() -> list[str]:
+    """What drpt needs; nothing is known where its source runs without being installed."""
+    try:
+        return requires(NAME) or []
+    except PackageNotFoundError:
+        return []
 
 
 def _version(package: str) -> str | None:

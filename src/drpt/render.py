@@ -6,7 +6,6 @@ import warnings
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
 from time import perf_counter
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drpt.checkpoint import Checkpoint
+from drpt.distribution import versions
 from drpt.error import squared_differences
 from drpt.files import check_file
 from drpt.film import Film
@@ -302,7 +302,7 @@ class Rendering:
             "mode": str(self.settings.mode),
             "scene": to_toml(self.settings.scene),
             "error": self._has_error,
-            **{f"version of {name}": version(name) for name in ("drpt", "drjit")},
+            **{f"version of {name}": found for name, found in versions("drjit").items()},
             "backend": f"{machine.name}, LLVM {machine.llvm_version}, {machine.vector_width} lanes",
         }
 

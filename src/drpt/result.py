@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drpt.distribution import versions
 from drpt.error import estimate
 from drpt.notebook import figure
 from drpt.output import write
@@ -115,7 +115,7 @@ class Result:
         """Denoise the image by Open Image Denoise, guided by albedo and normal if it has them.
 
         The result is biased, and says so: its ``denoised`` is true, its error is not a number. See
-        :func:`drpt.denoise.denoise`. Raises `ImportError` without the extra ``drpt[denoise]``.
+        :func:`drpt.denoise.denoise`. Raises `ImportError` without the extra ``denoise``.
         """
         from drpt.denoise import denoise
 
@@ -131,8 +131,8 @@ class Result:
             settings["first_non_finite"] = "{} {} {}".format(*self.first_non_finite)
         if np.isfinite(self.error):
             settings["error"] = self.error
-        versions = {name: version(name) for name in ("drpt", "drjit", "numpy")}
-        return {**settings, "mode": str(self.mode), **versions, "scene": to_toml(self.scene)}
+        found = versions("drjit", "numpy")
+        return {**settings, "mode": str(self.mode), **found, "scene": to_toml(self.scene)}
 
     def save(
         self, path: str | PathLike[str], *, exposure: float = 0.0, curve: str = "srgb"

@@ -428,7 +428,7 @@ class TestLayers:
         self, fake: Fake, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
         monkeypatch.setitem(sys.modules, "mitsuba_oidn", None)
-        assert_refused(capsys, ["good.toml", "--denoise"], ("denoise:", "'drpt[denoise]'"))
+        assert_refused(capsys, ["good.toml", "--denoise"], ("denoise:", "[denoise]'"))
         assert fake.passes == 0
 
 

@@ -19,6 +19,7 @@ from websockets.typing import Origin
 
 from drpt import cli
 from drpt.cli import view
+from drpt.distribution import install_command
 from drpt.view import serving, worker
 from tests.cli.running import files, status_of
 
@@ -124,7 +125,7 @@ def test_without_the_extra_it_says_how_to_get_it(
     printed, complaint = capsys.readouterr()
     assert printed == ""
     assert complaint.startswith(f"drpt view: error: view: it needs {package} (")
-    assert complaint.endswith("; python -m pip install 'drpt[view]' installs it\n")
+    assert complaint.endswith(f"; {install_command('view')} installs it\n")
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import drpt
 from drpt.cli.parser import add_scene, add_transport
 from drpt.cli.status import STATUSES, bad_input
+from drpt.render import explain
 from drpt.scene import load_scene
 
 if TYPE_CHECKING:
@@ -36,6 +36,6 @@ def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
     with bad_input(args.parser):
         scene = load_scene(args.scene)
-        explanation = drpt.explain(scene, bounces=args.bounces, mode=args.mode)
+        explanation = explain(scene, bounces=args.bounces, mode=args.mode)
     print(explanation)
     return 0

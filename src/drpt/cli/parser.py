@@ -8,8 +8,8 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
-import drpt
 from drpt.cli.status import BAD_INPUT, say
+from drpt.distribution import VERSION
 from drpt.render import SAMPLERS, Mode
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def add_version(parser: Parser) -> None:
     parser.add_argument(
         "--version",
         action="version",
-        version=f"%(prog)s {drpt.__version__}",
+        version=f"%(prog)s {VERSION}",
         help="say the version",
     )
 

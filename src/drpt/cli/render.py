@@ -26,6 +26,7 @@ from drpt.cli.parser import (
 )
 from drpt.cli.status import FAILED, STATUSES, TERMINATED, bad_input, drop_stdout, say
 from drpt.denoise import load_denoiser
+from drpt.distribution import NAME
 from drpt.kernel import backend
 from drpt.output import SUFFIXES, check_target
 from drpt.progress import with_bar
@@ -109,7 +110,8 @@ def _add_pictures(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--denoise",
         action="store_true",
-        help="denoise the picture by Open Image Denoise (drpt[denoise]), which makes it biased",
+        help="denoise the picture by Open Image Denoise, which makes it biased; "
+        f"it needs the extra {NAME}[denoise]",
     )
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from drpt.cli.interrupts import interrupts_noted
 from drpt.cli.parser import add_scene, add_size, integer, thread_count
 from drpt.cli.status import STATUSES, TERMINATED, bad_input
+from drpt.distribution import EXTRAS, NAME, install_command
 from drpt.kernel import backend
 
 if TYPE_CHECKING:
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from drpt.cli.parser import Commands
     from drpt.view.worker import Worker
 
-PACKAGES = ("starlette", "uvicorn", "websockets")
-"""What the extra installs."""
+PACKAGES = EXTRAS["view"]
+"""What the extra installs, which are also the names of their imports."""
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 """Variables of which one is set where a Linux has a browser to open."""
 
@@ -34,8 +35,9 @@ def add(commands: Commands) -> None:
     parser = commands.add_parser(
         "view",
         help="look at a scene in the browser, and change it",
-        description="""Show a scene in the browser while it is rendered: compare modes, move the
-light, see the paths through a pixel. Needs an extra: pip install 'drpt[view]'.""",
+        description=f"""Show a scene in the browser while it is rendered: compare modes, move the
+light, see the paths through a pixel. It needs the extra {NAME}[view];
+without that, this command says how to install it.""",
         epilog=f"""examples:
   drpt view cornell-box
   drpt view my.toml --width 512 --height 512 --threads 4
@@ -110,7 +112,7 @@ def _check_packages() -> None:
         try:
             import_module(name)
         except ImportError as error:
-            install = "python -m pip install 'drpt[view]' installs it"
+            install = f"{install_command('view')} installs it"
             raise ImportError(f"view: it needs {name} ({error}); {install}") from error
 
 

@@ -16,9 +16,6 @@ from drpt.output import to_display
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-INSTALL = "pip install 'drpt[flip]'"
-"""What installs the package."""
-
 
 def has_flip() -> bool:
     """Whether the package is installed."""

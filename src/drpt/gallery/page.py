@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.metadata import version
 from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING
 
+from drpt.distribution import VERSION
 from drpt.gallery import markup
 from drpt.gallery.answers import Table
 from drpt.gallery.charts import log_log
@@ -64,7 +64,7 @@ class Page:
             contents="\n".join(markup.link(number, title) for number, title, _ in sections),
             sections="\n".join(markup.section(*section) for section in sections),
             reference_spp=REFERENCE_SPP,
-            version=version("drpt"),
+            version=VERSION,
         )
 
     def _lead(self) -> list[str]:

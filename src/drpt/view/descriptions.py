@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from drpt.distribution import VERSION
 from drpt.render import SAMPLERS, Mode
 from drpt.scene import Mesh
 from drpt.view.state import State
@@ -20,7 +20,7 @@ def hello(scenes: Scenes) -> dict[str, Any]:
     """Return the first message: what there is to choose from, and what is shown by default."""
     return {
         "type": "hello",
-        "version": version("drpt"),
+        "version": VERSION,
         "scenes": scenes.names,
         "modes": list(Mode),
         "samplers": list(SAMPLERS),
