@@ -1,6 +1,7 @@
 """Loads the backend before test modules import kernels; moves arrays to the device and back."""
 
 from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,15 @@ def _forget_shapes() -> None:
     from drpt.kernel.launch import forget
 
     forget()
+
+
+@pytest.fixture(autouse=True)
+def _arithmetic_of_renders() -> Iterator[None]:
+    """Let tests call parts of kernels as launches do; kernels of launches do not need that."""
+    import drjit as dr
+
+    with dr.scoped_set_flag(dr.JitFlag.FastMath, False):
+        yield
 
 
 def to_device(values: npt.ArrayLike) -> Any:

@@ -19,7 +19,9 @@ import pytest
 
 import drpt
 from drpt.checkpoint import BODY, FORMAT, MAGIC, Checkpoint, CheckpointError
-from drpt.kernel.launch import Launcher
+from drpt.kernel import launch
+from drpt.kernel.launch import Launcher, forget
+from drpt.kernel.primitives import make_primitives
 from tests.scenes import BALL, LAMP, LAMP_AND_BALL, scene_of
 
 SETTINGS: dict[str, Any] = {"spp": 100, "bounces": 2, "mode": "mis", "sampler": "sobol", "seed": 3}
@@ -256,23 +258,55 @@ class TestAnotherRender:
         assert "\n" not in str(error.value)
         assert path.read_bytes() == before
 
-    @pytest.mark.parametrize("name", ["drpt", "drjit"])
+    @pytest.mark.parametrize("name", ["drpt", "drjit", "mitsuba", "numpy"])
     def test_another_version_is_refused(
         self, name: str, path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         run_passes(rendering_of(path), 1)
-        real = RENDER.version
-        monkeypatch.setattr(RENDER, "version", lambda n: "99.0" if n == name else real(n))
+        real = RENDER.versions
+        monkeypatch.setattr(RENDER, "versions", lambda *names: {**real(*names), name: "99.0"})
         with pytest.raises(CheckpointError, match=rf"version of {name} is .* there and 99\.0 here"):
             rendering_of(path)
 
-    def test_another_backend_is_refused(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    @pytest.mark.parametrize(
+        ("name", "there"),
+        [("backend", {"name": "cuda"}), ("version of LLVM", {"llvm_version": "99.0"})],
+    )
+    def test_another_backend_is_refused(
+        self, name: str, there: dict[str, Any], path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from drpt.kernel import backend
+
+        run_passes(rendering_of(path), 1)
+        other = replace(backend.describe(), **there)
+        monkeypatch.setattr(backend, "describe", lambda: other)
+        (value,) = there.values()
+        with pytest.raises(CheckpointError, match=rf"{name} is .* there and {value} here"):
+            rendering_of(path)
+
+    def test_vectors_of_another_width_are_no_difference(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         from drpt.kernel import backend
 
         run_passes(rendering_of(path), 1)
         wide = replace(backend.describe(), vector_width=3)
         monkeypatch.setattr(backend, "describe", lambda: wide)
-        with pytest.raises(CheckpointError, match=r"backend is .* lanes there and .* 3 lanes here"):
+        assert rendering_of(path).spp == 16
+
+    def test_a_scene_that_is_prepared_otherwise_is_refused(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As another library might round it."""
+        run_passes(rendering_of(path), 1)
+        forget()
+
+        def rounded_otherwise(shapes: Any) -> Any:
+            primitives = make_primitives(shapes)
+            return replace(primitives, spheres=primitives.spheres * (1 + 2**-23))
+
+        monkeypatch.setattr(launch, "make_primitives", rounded_otherwise)
+        with pytest.raises(CheckpointError, match=r"prepared scene is \w+ there and \w+ here"):
             rendering_of(path)
 
     @pytest.mark.parametrize("sizes", [2, 40])

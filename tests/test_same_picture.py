@@ -1,11 +1,11 @@
-"""One picture, however it is computed: arithmetic, loops, Embree, plans of passes.
+"""One picture, however it is computed: loops, Embree, plans of passes.
 
-All of them trace the same samples. That threads change nothing is shown in `test_render`.
+All of them trace the same samples. That threads change nothing is shown in `test_render`, and that
+CPUs do not in `kernel/test_arithmetic`.
 """
 
 from __future__ import annotations
 
-import drjit as dr
 import numpy as np
 import pytest
 
@@ -56,16 +56,6 @@ def test_plans_of_passes_change_the_last_bit_at_most(
     found = drpt.render(small_scene(), SPP, 1, "explicit")
     assert (np.abs(found.image - plain.image) <= ULP * plain.image).all()
     assert (found.rays, found.non_finite) == (plain.rays, plain.non_finite)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", MODES)
-def test_fast_arithmetic_and_strict(mode: str) -> None:
-    fast = drpt.render(small_scene(), SPP, BOUNCES, mode)
-    with dr.scoped_set_flag(dr.JitFlag.FastMath, False):
-        strict = drpt.render(small_scene(), SPP, BOUNCES, mode)
-    assert not np.array_equal(strict.image, fast.image)  # the flag is heeded
-    assert_same(strict, fast)
 
 
 @pytest.mark.slow

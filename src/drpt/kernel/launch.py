@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import drjit as dr
 import numpy as np
 
+from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import DeviceCamera, make_camera
 from drpt.kernel.coverage import covering_facets
-from drpt.kernel.denormals import flush_denormals
 from drpt.kernel.device_scene import DeviceScene, upload
 from drpt.kernel.estimator import Features
 from drpt.kernel.kept import Kept
@@ -98,6 +98,7 @@ class Launcher:
         work = self._work(pixels, samples, len(samples), _seed_word(seed) + passes.start)
         return self._launch(work._replace(lanes=len(passes)))
 
+    @same_bits()
     def single_paths(self, pixel: int, samples: range, seed: int) -> SinglePaths:
         """The same paths as :meth:`launch` traces of a pixel, before their first vertex."""
         work = self._work(range(pixel, pixel + 1), samples, 1, _word_of(seed, samples))
@@ -124,6 +125,7 @@ class Launcher:
             seed=seed_word & 0xFFFFFFFF,
         )
 
+    @same_bits()
     def _launch(self, work: Work) -> Sums:
         """Trace with so many lanes for each pixel; ``radiance`` is (lanes, pixels, 3)."""
         if not self.tracer.features.emission:
@@ -133,9 +135,8 @@ class Launcher:
         # One array, by the kernel that makes it.
         radiance = dr.empty(self.tracer.scene.types.Float64, 3 * lanes.count)
         dr.scatter(radiance, totals.radiance, lanes.place)
-        with flush_denormals():
-            dr.eval(radiance, totals.rays, totals.non_finite)
-            dr.sync_thread()
+        dr.eval(radiance, totals.rays, totals.non_finite)
+        dr.sync_thread()
         by_pixel = radiance.numpy().reshape(work.lanes, work.pixels, 3)
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
+from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import Ray
-from drpt.kernel.denormals import flush_denormals
 from drpt.kernel.device_scene import to_device
 from drpt.kernel.estimator import Features, Mode
 from drpt.kernel.guide import DevicePatches, Guide
@@ -53,6 +53,7 @@ def learn(primitives: Primitives, scene: DeviceScene) -> Guide:
     return Guide(patches, light, scene.types, upload)
 
 
+@same_bits()
 def _exchange(primitives: Primitives, scene: DeviceScene, patches: Patches) -> NDArray[np.float64]:
     """The light that reaches each of the patches that there are from each other, (k, k)."""
     mode = Mode.EXPLICIT if primitives.diffuse.all() else Mode.MIS
@@ -61,9 +62,8 @@ def _exchange(primitives: Primitives, scene: DeviceScene, patches: Patches) -> N
     on_device = DevicePatches(patches, scene.types, partial(to_device, types=scene.types))
     exchange = _Exchange(tracer, on_device, scene.types.UInt32(there.astype(np.uint32)))
     mean = exchange.light(dr.arange(scene.types.UInt32, len(there) ** 2))
-    with flush_denormals():
-        dr.eval(mean)
-        dr.sync_thread()
+    dr.eval(mean)
+    dr.sync_thread()
     return mean.numpy().reshape(len(there), -1).astype(np.float64)
 
 

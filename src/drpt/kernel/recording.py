@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import drjit as dr
 import numpy as np
 
+from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import Ray
 from drpt.kernel.intersect import closest_hit
 
@@ -62,6 +63,7 @@ class Vertices(NamedTuple):
     light_point: NDArray[np.float64]
 
 
+@same_bits()
 def record(launcher: Launcher, pixel: int, samples: range, seed: int) -> Vertices:
     """Trace samples of a pixel as a render traces them, and keep their vertices."""
     tracer, recorder = launcher.tracer, _Recorder(launcher.tracer, launcher.primitives)

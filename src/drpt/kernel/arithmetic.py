@@ -1,8 +1,4 @@
-"""Denormal numbers count as 0 on Dr.Jit's threads; here, on the calling thread, too.
-
-Dr.Jit runs a kernel on the calling thread where the pool has no other, or the kernel is small. The
-same call gives the same bits on any number of threads only if all of them round alike.
-"""
+"""Arithmetic that gives the same bits on all threads and on every x86-64 CPU with FMA."""
 
 from __future__ import annotations
 
@@ -11,6 +7,8 @@ import platform
 import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
+
+import drjit as dr
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,7 +24,20 @@ class _Environment(ctypes.Structure):
 
 
 @contextmanager
-def flush_denormals() -> Iterator[None]:
+def same_bits() -> Iterator[None]:
+    """Trace and run kernels so that their bits depend on no thread and no CPU.
+
+    FastMath lets Dr.Jit take the CPU's approximate reciprocal square root, which has other bits in
+    vectors of 16 numbers than in those of 8. Denormal numbers count as 0 on Dr.Jit's threads; here
+    they do on the calling thread, too, which runs a kernel where the pool has no other thread, or
+    the kernel is small. Both settings belong to a thread.
+    """
+    with dr.scoped_set_flag(dr.JitFlag.FastMath, False), _flush_denormals():
+        yield
+
+
+@contextmanager
+def _flush_denormals() -> Iterator[None]:
     """Make denormals 0 on this thread; does nothing but on Linux on x86-64."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         yield
