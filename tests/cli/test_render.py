@@ -260,7 +260,7 @@ class TestRender:
     def test_one_side_of_the_picture_can_be_changed(self, fake: Fake) -> None:
         assert cli.render_main(["good.toml", "--width", "4"]) == 0
         camera = fake.arguments["scene"].camera
-        assert (camera.width, camera.height) == (4, 6)
+        assert (camera.width, camera.height) == (4, 3)
 
     def test_threads_reach_the_backend(self, fake: Fake, monkeypatch: pytest.MonkeyPatch) -> None:
         counts: list[int] = []
@@ -373,7 +373,7 @@ class TestExplain:
         argv = ["good.toml", "--explain", "--width", "4", "--bounces", "1", "--mode", "explicit"]
         assert cli.render_main(argv) == 0
         assert printed == ["(4, '1', 'explicit')\n"]
-        assert capsys.readouterr().out.startswith("good  4x6")
+        assert capsys.readouterr().out.startswith("good  4x3")
 
     @pytest.mark.usefixtures("fake")
     def test_that_nobody_reads_keeps_no_picture_away(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -690,10 +690,10 @@ def test_the_program_renders_what_the_function_renders() -> None:
         check=False,
     )
     assert (run.returncode, run.stderr) == (0, "")
-    assert run.stdout.startswith("good  5x6  4 spp  2 bounces  explicit  sobol\n")
+    assert run.stdout.startswith("good  5x4  4 spp  2 bounces  explicit  sobol\n")
     image, metadata = read_exr("good.exr")
     scene = drpt.load_scene("good.toml")
-    scene = replace(scene, camera=replace(scene.camera, width=5))
+    scene = replace(scene, camera=replace(scene.camera, width=5, height=4))
     expected = drpt.render(scene, spp=4, bounces=2, mode="explicit", seed=3)
     np.testing.assert_array_equal(image, expected.image)
     assert image.any()

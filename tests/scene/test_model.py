@@ -92,6 +92,35 @@ def test_replace_checks_again() -> None:
     refusal("width", replace, camera(), width=0)
 
 
+class TestResized:
+    @pytest.mark.parametrize(
+        ("sides", "size"),
+        [
+            ({}, (160, 90)),
+            ({"width": 16}, (16, 9)),
+            ({"width": 100}, (100, 56)),
+            ({"width": 1}, (1, 1)),
+            ({"height": 180}, (320, 180)),
+            ({"width": 7, "height": 5}, (7, 5)),
+        ],
+    )
+    def test_one_side_alone_keeps_the_aspect_ratio(
+        self, sides: dict[str, int], size: tuple[int, int]
+    ) -> None:
+        scene = Scene(camera(width=160, height=90), [Sphere((0, 0, 0), 1, radiance=1)])
+        assert scene.resized(**sides) == replace(
+            scene, camera=camera(width=size[0], height=size[1])
+        )
+
+    @pytest.mark.parametrize(
+        ("sides", "field"),
+        [({"width": 0}, "width"), ({"height": 2.5}, "height"), ({"width": 65536}, "height")],
+    )
+    def test_sides_that_no_camera_has_are_refused(self, sides: dict[str, Any], field: str) -> None:
+        scene = Scene(camera(width=2, height=3), [Sphere((0, 0, 0), 1, radiance=1)])
+        refusal(field, scene.resized, **sides)
+
+
 def test_mesh_arrays_are_read_only_copies() -> None:
     vertices = np.asfortranarray(np.eye(3))
     mesh = Mesh(vertices, np.array(FACES, np.uint64), normals=2 * vertices, radiance=1)

@@ -36,10 +36,22 @@ def test_large_pictures_are_shown_smaller(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("width", "height", "size"), [(600, 500, (600, 500)), (99, None, (99, 128))]
+    ("width", "height", "size"),
+    [(600, 500, (600, 500)), (99, None, (99, 99)), (None, 64, (64, 64))],
 )
 def test_a_size_that_is_asked_for_is_kept(
     width: int | None, height: int | None, size: tuple[int, int]
 ) -> None:
     camera = Scenes("cornell-box", width, height).load("furnace").camera
+    assert (camera.width, camera.height) == size
+
+
+@pytest.mark.parametrize(
+    ("sides", "size"), [({"width": 96}, (96, 54)), ({"height": 90}, (160, 90))]
+)
+def test_one_side_alone_keeps_the_aspect_ratio(
+    sides: dict[str, int], size: tuple[int, int], tmp_path: Path
+) -> None:
+    drpt.load_scene("veach").resized(1920, 1080).save(tmp_path / "large.toml")
+    camera = Scenes(str(tmp_path / "large.toml"), **sides).load("large.toml").camera
     assert (camera.width, camera.height) == size

@@ -82,8 +82,13 @@ def add_scene(parser: Parser) -> None:
 
 def add_size(group: argparse._ActionsContainer) -> None:
     """Add ``--width`` and ``--height``; see `drpt.Scene.resized`."""
-    group.add_argument("--width", metavar="N", type=integer, help="pixels (default: the scene's)")
-    group.add_argument("--height", metavar="N", type=integer, help="pixels (default: the scene's)")
+    for side, other in (("width", "height"), ("height", "width")):
+        group.add_argument(
+            f"--{side}",
+            metavar="N",
+            type=integer,
+            help=f"pixels (default: the scene's; with --{other} alone, by its aspect ratio)",
+        )
 
 
 def add_display(group: argparse._ActionsContainer) -> None:

@@ -11,13 +11,14 @@ import os
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drpt.messages import shortened
 from drpt.scene import checks
 from drpt.scene.builtin import builtin_names, builtin_path
 from drpt.scene.checks import SceneError
 from drpt.scene.model import Camera, Diffuse, Material, Mesh, Phong, Scene, Shape, Sphere
+from drpt.scene.names import Names
 from drpt.scene.reading import read_file
 from drpt.scene.toml import parse_toml
 
@@ -42,9 +43,33 @@ def load_scene(name_or_path: str | PathLike[str]) -> Scene:
     Raises `SceneError`, one line that names the file and the field, if there is no such scene or
     if something in it is missing, unknown or not allowed.
     """
+    return read_scene(name_or_path).scene
+
+
+class SceneFile(NamedTuple):
+    """What a scene file holds.
+
+    Attributes
+    ----------
+    path
+        Of the file.
+    scene
+        The scene.
+    names
+        What the file calls its materials and meshes.
+    """
+
+    path: Path
+    scene: Scene
+    names: Names
+
+
+def read_scene(name_or_path: str | PathLike[str]) -> SceneFile:
+    """Read a scene like :func:`load_scene`, with the names that its file uses."""
     path = _find(name_or_path)
     try:
-        return _scene(parse_toml(read_file(path, MAX_BYTES)), path.parent)
+        table = parse_toml(read_file(path, MAX_BYTES))
+        return SceneFile(path, *_scene(table, path.parent))
     except SceneError as error:
         raise error.in_file(str(path)) from None
 
@@ -63,7 +88,7 @@ def _find(name_or_path: str | PathLike[str]) -> Path:
     raise _unknown("", "scene", name, builtin_names(), "the path of a scene file")
 
 
-def _scene(scene: Table, folder: Path) -> Scene:
+def _scene(scene: Table, folder: Path) -> tuple[Scene, Names]:
     _check_keys(scene, required=("camera", "shapes"), optional=("description", "materials"))
     with _within("camera"):
         camera = _camera(scene["camera"])
@@ -75,7 +100,13 @@ def _scene(scene: Table, folder: Path) -> Scene:
     for index, shape in enumerate(scene["shapes"]):
         with _within(f"shapes[{index}]"):
             shapes.append(_shape(shape, materials, folder))
-    return Scene(camera, shapes, scene.get("description", ""))
+    return Scene(camera, shapes, scene.get("description", "")), _names(materials, scene["shapes"])
+
+
+def _names(materials: dict[str, Material], shapes: list[Table]) -> Names:
+    of_shapes = (shape.get("material") for shape in shapes)
+    named = tuple(name if isinstance(name, str) else None for name in of_shapes)
+    return Names(materials, named, tuple(shape.get("file") for shape in shapes))
 
 
 def _camera(value: object) -> Camera:

@@ -308,11 +308,21 @@ class Scene:
         _set(self, camera=camera, shapes=_shapes(shapes), description=description)
 
     def resized(self, width: int | None = None, height: int | None = None) -> Scene:
-        """Return the same scene in a picture of so many pixels; None leaves a side as it is."""
-        camera = self.camera
-        width = camera.width if width is None else width
-        height = camera.height if height is None else height
-        return replace(self, camera=replace(camera, width=width, height=height))
+        """Return the same scene with a picture of another size in pixels.
+
+        If one side is None, it follows from the other by the aspect ratio of the camera, rounded
+        to a whole pixel and at least 1. Raises `SceneError` for a size that a camera cannot have.
+        """
+        old = camera = self.camera
+        if width is not None:
+            camera = replace(camera, width=width)
+        if height is not None:
+            camera = replace(camera, height=height)
+        if width is None and height is not None:
+            camera = replace(camera, width=max(1, round(old.width * camera.height / old.height)))
+        elif height is None and width is not None:
+            camera = replace(camera, height=max(1, round(old.height * camera.width / old.width)))
+        return replace(self, camera=camera)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a TOML scene file, and its meshes into a folder beside it.

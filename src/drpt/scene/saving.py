@@ -14,10 +14,13 @@ import numpy as np
 from drpt.scene import checks
 from drpt.scene.checks import SceneError
 from drpt.scene.model import Diffuse, Material, Mesh, Scene, Shape
+from drpt.scene.names import numbered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from os import PathLike
+
+    from drpt.scene.names import Names
 
 Table = dict[str, Any]
 """A TOML table."""
@@ -26,11 +29,12 @@ MAX_INLINE_VERTICES = 1000
 """Vertices of a scene up to which `to_toml` spells its meshes out."""
 
 
-def save_scene(scene: Scene, path: str | PathLike[str]) -> None:
+def save_scene(scene: Scene, path: str | PathLike[str], names: Names | None = None) -> None:
     """Write `scene` to a TOML file, and its meshes as NPZ files into ``<stem>-meshes`` beside it.
 
     `load_scene` reads an equal scene from it. Meshes are named by their content and every file
     is replaced as a whole, the scene file last: whatever happens, the file there is complete.
+    With `names`, materials are called so, and meshes that have the name of a file are not written.
     Raises `SceneError` if it cannot be written.
     """
     if not isinstance(path, str | os.PathLike) or not Path(path).name:
@@ -46,57 +50,57 @@ def save_scene(scene: Scene, path: str | PathLike[str]) -> None:
         return {"file": file.relative_to(path.parent).as_posix()}
 
     try:
-        replace_file(path, _toml(scene, save_mesh).encode())
+        replace_file(path, _toml(scene, save_mesh, names).encode())
     except OSError as error:
         raise SceneError(f"it cannot be written: {error.strerror}", source=str(path)) from None
     except ValueError as error:  # a null character in the path, half a character in a text
         raise SceneError(f"it cannot be written: {error}", source=str(path)) from None
 
 
-def to_toml(scene: Scene) -> str:
+def to_toml(scene: Scene, names: Names | None = None) -> str:
     """Return `scene` as one TOML text, for the metadata of pictures.
 
     If its meshes have more than 1000 vertices together, each mesh is given by ``vertex_count``,
     ``face_count`` and the ``sha256`` of its arrays; such a text does not load.
+    Materials, and meshes from files, are called as in `names`.
     """
     vertices = sum(len(shape.vertices) for shape in scene.shapes if isinstance(shape, Mesh))
-    return _toml(scene, _arrays if vertices <= MAX_INLINE_VERTICES else _summary)
+    return _toml(scene, _arrays if vertices <= MAX_INLINE_VERTICES else _summary, names)
 
 
-def _toml(scene: Scene, describe_mesh: Callable[[Mesh], Table]) -> str:
-    """Return `scene` as TOML, with the keys that `describe_mesh` gives for a mesh."""
+def _toml(scene: Scene, describe_mesh: Callable[[Mesh], Table], names: Names | None) -> str:
+    """Return `scene` as TOML; `describe_mesh` gives the keys of a mesh that has no file."""
     import tomli_w
 
-    names = _material_names(scene)
+    names = names or numbered(scene)
+    geometries = [
+        {"type": "mesh", "file": file} if file else _geometry(shape, describe_mesh)
+        for shape, file in zip(scene.shapes, names.files, strict=True)
+    ]
+    surfaces = map(_surface, scene.shapes, names.of_shapes)
     table = {
         "description": scene.description,
         "camera": asdict(scene.camera),
-        "materials": {name: _material(material) for material, name in names.items()},
-        "shapes": [_shape(shape, names, describe_mesh) for shape in scene.shapes],
+        "materials": {name: _material(m) for name, m in names.materials.items()},
+        "shapes": [g | s for g, s in zip(geometries, surfaces, strict=True)],
     }
     return tomli_w.dumps(table)
-
-
-def _material_names(scene: Scene) -> dict[Material, str]:
-    """Return a name for each material of `scene`, in the order of their first use."""
-    materials = dict.fromkeys(shape.material for shape in scene.shapes if shape.material)
-    return {material: f"material-{n}" for n, material in enumerate(materials, start=1)}
 
 
 def _material(material: Material) -> Table:
     return {"type": "diffuse" if isinstance(material, Diffuse) else "phong", **asdict(material)}
 
 
-def _shape(
-    shape: Shape, names: dict[Material, str], describe_mesh: Callable[[Mesh], Table]
-) -> Table:
+def _geometry(shape: Shape, describe_mesh: Callable[[Mesh], Table]) -> Table:
     if isinstance(shape, Mesh):
-        geometry = {"type": "mesh", **describe_mesh(shape)}
-    else:
-        geometry = {"type": "sphere", "center": shape.center, "radius": shape.radius}
-    if shape.material is not None:
-        return {**geometry, "material": names[shape.material]}
-    return {**geometry, "radiance": shape.radiance}
+        return {"type": "mesh", **describe_mesh(shape)}
+    return {"type": "sphere", "center": shape.center, "radius": shape.radius}
+
+
+def _surface(shape: Shape, name: str | None) -> Table:
+    if shape.material is None:
+        return {"radiance": shape.radiance}
+    return {"material": name or _material(shape.material)}
 
 
 def _arrays(mesh: Mesh) -> Table:

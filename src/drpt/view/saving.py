@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
-from pathlib import Path
+from dataclasses import replace
+from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
-from drpt.scene import Mesh
-from drpt.scene.saving import MAX_INLINE_VERTICES, to_toml
+from drpt.scene import Mesh, SceneError
+from drpt.scene.meshes import MAX_BYTES
+from drpt.scene.reading import read_file
+from drpt.scene.saving import MAX_INLINE_VERTICES, save_scene, to_toml
 
 if TYPE_CHECKING:
     from drpt.result import Result
     from drpt.scene import Scene
+    from drpt.scene.files import SceneFile
 
 FORMATS = ("exr", "png", "scene")
 MEDIA = {
@@ -40,13 +45,42 @@ def picture_file(result: Result, stem: str, suffix: str, exposure: float) -> Fil
         return File(name, MEDIA[suffix], path.read_bytes())
 
 
-def scene_file(scene: Scene, stem: str) -> File:
-    """Return a scene as a TOML file; if its meshes are large, zipped with them beside it."""
+def scene_file(shown: Scene, source: SceneFile) -> File:
+    """Return a scene with the size and the names of the file that it came from.
+
+    That is a TOML file; if meshes are in files of their own, or large, it is zipped with them.
+    Files of meshes are copied as they are now. Raises `SceneError` if one cannot be read any more.
+    """
+    camera = source.scene.camera
+    scene = shown.resized(camera.width, camera.height)
+    names, stem = source.names.after_changes(scene), source.path.stem
     vertices = sum(len(shape.vertices) for shape in scene.shapes if isinstance(shape, Mesh))
-    if vertices <= MAX_INLINE_VERTICES:
-        return File(f"{stem}.toml", MEDIA["toml"], to_toml(scene).encode())
+    if vertices <= MAX_INLINE_VERTICES and not any(names.files):
+        return File(f"{stem}.toml", MEDIA["toml"], to_toml(scene, names).encode())
+    inside = {file: _inside(file) for file in names.files if file}
+    names = replace(names, files=tuple(file and inside[file] for file in names.files))
     with TemporaryDirectory() as folder:
-        Path(folder, stem).mkdir()
-        scene.save(Path(folder, stem, f"{stem}.toml"))
-        archive = shutil.make_archive(str(Path(folder, "scene")), "zip", Path(folder, stem))
+        root = Path(folder, stem)
+        root.mkdir()
+        for file, copy in inside.items():
+            (root / copy).parent.mkdir(parents=True, exist_ok=True)
+            (root / copy).write_bytes(_mesh(source.path.parent / file))
+        save_scene(scene, root / f"{stem}.toml", names)
+        archive = shutil.make_archive(str(Path(folder, "scene")), "zip", root)
         return File(f"{stem}.zip", MEDIA["zip"], Path(archive).read_bytes())
+
+
+def _mesh(path: Path) -> bytes:
+    try:
+        return read_file(path, MAX_BYTES)
+    except SceneError as error:
+        raise error.in_file(str(path)) from None
+
+
+def _inside(file: str) -> str:
+    """Name of a mesh inside an archive: its own, unless that leads out of the scene's folder."""
+    path = PurePath(file)
+    if path.is_absolute() or ".." in path.parts:
+        digest = hashlib.sha256(file.encode()).hexdigest()[:8]
+        return f"meshes/{digest}-{path.name}"
+    return path.as_posix()

@@ -7,12 +7,13 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drpt.scene import load_scene
 from drpt.scene.builtin import builtin_names
 from drpt.scene.checks import refuse
+from drpt.scene.files import read_scene
 
 if TYPE_CHECKING:
     from drpt.scene import Scene
+    from drpt.scene.files import SceneFile
 
 MAX_PIXELS = 2**17
 """Larger pictures are shown smaller, unless their size was asked for."""
@@ -26,7 +27,8 @@ class Scenes:
     scene
         Name of a built-in scene, or path of a scene file, which is served by its file's name.
     width, height
-        Size of the pictures in pixels; None for the scene's own.
+        Size of the pictures in pixels, see :meth:`drpt.Scene.resized`; both None for the scene's
+        own, unless it is large.
 
     Raises `SceneError` if there is no such scene, or something in it is not allowed.
     """
@@ -36,6 +38,7 @@ class Scenes:
         self._paths = {self.default: scene} | {name: name for name in builtin_names()}
         self._paths[self.default] = scene
         self._size = width, height
+        self.file = lru_cache(maxsize=None)(self._file)
         self.load = lru_cache(maxsize=None)(self._load)
         self.load(self.default)
 
@@ -45,10 +48,14 @@ class Scenes:
         return list(self._paths)
 
     def _load(self, name: str) -> Scene:
-        """Return a scene; raises `SceneError` for a name that is not served."""
+        """Return a scene in the size in which it is shown; raises like :meth:`file`."""
+        return sized(self.file(name).scene, *self._size)
+
+    def _file(self, name: str) -> SceneFile:
+        """Return a scene as its file has it; raises `SceneError` for a name that is not served."""
         if name not in self._paths:
             raise refuse("scene", name, f"one of {', '.join(self._paths)}")
-        return sized(load_scene(self._paths[name]), *self._size)
+        return read_scene(self._paths[name])
 
 
 def sized(scene: Scene, width: int | None, height: int | None) -> Scene:

@@ -220,7 +220,7 @@ class Session:
         with self._lock:
             save = self._saves.popleft()
         try:
-            file = _file(show, save)
+            file = self._file(show, save)
         except (OSError, ValueError, MemoryError) as error:
             self._fail(error)
             return
@@ -228,17 +228,15 @@ class Session:
         with self._lock:
             self._messages.append(pack(header, file.content))
 
+    def _file(self, show: Show, save: _Save) -> File:
+        if save.what == "scene":
+            return scene_file(show.scene, self._scenes.file(show.state.scene))
+        result = show.halves[min(save.half, len(show.halves) - 1)].result()
+        return picture_file(result, Path(show.state.scene).stem, save.what, save.exposure)
+
     def _fail(self, error: Exception) -> None:
         self._tell({"type": "failed", "message": str(error) or type(error).__name__})
 
     def _tell(self, message: Mapping[str, Any]) -> None:
         with self._lock:
             self._messages.append(json.dumps(message, allow_nan=False))
-
-
-def _file(show: Show, save: _Save) -> File:
-    stem = Path(show.state.scene).stem
-    if save.what == "scene":
-        return scene_file(show.scene, stem)
-    result = show.halves[min(save.half, len(show.halves) - 1)].result()
-    return picture_file(result, stem, save.what, save.exposure)

@@ -29,7 +29,7 @@ class Worker:
     scene_name
         Name of a built-in scene, or path of a scene file.
     width, height
-        Size of the pictures in pixels; None for the scene's own.
+        Size of the pictures in pixels; see :class:`drpt.view.scenes.Scenes`.
 
     Raises `SceneError`, which names the file and the field.
     """
