@@ -16,6 +16,7 @@ PACKAGE = Path(drpt.__file__).parent
 
 KNOWS: dict[str, set[str]] = {
     "messages": set(),
+    "distribution": set(),
     "files": {"messages"},
     "scene": {"files", "messages"},
     "kernel": {"scene"},
@@ -23,12 +24,12 @@ KNOWS: dict[str, set[str]] = {
     "error": set(),
     "output": {"files"},
     "plan": set(),
-    "denoise": set(),
+    "denoise": {"distribution"},
     "notebook": {"output"},
     "settings": {"kernel", "scene"},
     "stopping": {"settings"},
     "checkpoint": {"files"},
-    "result": {"denoise", "error", "kernel", "notebook", "output", "scene"},
+    "result": {"denoise", "distribution", "error", "kernel", "notebook", "output", "scene"},
     "progress": set(),
 }
 """What data flows along, and imports against: what a part may know beside itself.
