@@ -15,11 +15,12 @@ import drpt
 PACKAGE = Path(drpt.__file__).parent
 
 KNOWS: dict[str, set[str]] = {
+    "immutable": set(),
     "messages": set(),
     "distribution": set(),
     "files": {"messages"},
-    "scene": {"files", "messages"},
-    "kernel": {"scene"},
+    "scene": {"files", "immutable", "messages"},
+    "kernel": {"immutable", "scene"},
     "film": set(),
     "error": set(),
     "output": {"files"},
@@ -29,7 +30,16 @@ KNOWS: dict[str, set[str]] = {
     "settings": {"kernel", "scene"},
     "stopping": {"settings"},
     "checkpoint": {"files"},
-    "result": {"denoise", "distribution", "error", "kernel", "notebook", "output", "scene"},
+    "result": {
+        "denoise",
+        "distribution",
+        "error",
+        "immutable",
+        "kernel",
+        "notebook",
+        "output",
+        "scene",
+    },
     "progress": set(),
 }
 """What data flows along, and imports against: what a part may know beside itself.

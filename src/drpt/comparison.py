@@ -15,6 +15,7 @@ from drpt.crosscheck.colours import colour_end, signed_colours
 from drpt.crosscheck.flip import has_flip, mean_flip
 from drpt.distribution import install_command
 from drpt.error import DARK
+from drpt.immutable import Immutable
 from drpt.output import write
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ SETTINGS = ("scene", "mode", "spp", "bounces", "sampler", "seed", "jitter")
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Immutable):
     """A picture held against a reference.
 
     Attributes

@@ -18,6 +18,7 @@ from drpt.distribution import versions
 from drpt.error import squared_differences
 from drpt.files import check_file
 from drpt.film import Film
+from drpt.immutable import immutable
 from drpt.kernel import backend
 from drpt.kernel.estimator import SHARING_SPP, Mode, feature_facts, layout_facts
 from drpt.plan import parts, plan_passes, run_length
@@ -241,7 +242,7 @@ class Rendering:
             non_finite=self._non_finite,
             first_non_finite=self._first_non_finite,
             warning=self._warning(),
-            layers={SAMPLES: np.broadcast_to(np.float32(self.spp), shape[:2])},
+            layers={SAMPLES: np.broadcast_to(immutable(np.array(self.spp, np.float32)), shape[:2])},
             _differences=squared_differences(blocks, film.size).reshape(-1, *shape),
             _growth=film.samples / (len(blocks) * film.size) if len(blocks) else 1.0,
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from drpt.distribution import versions
 from drpt.error import estimate
+from drpt.immutable import Immutable, immutable
 from drpt.notebook import figure
 from drpt.output import write
 from drpt.scene.saving import to_toml
@@ -31,8 +32,8 @@ _NOT_METADATA = {"image", "scene", "layers", "first_non_finite", "warning"}
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
-    """A picture, and what it took.
+class Result(Immutable):
+    """A picture, and what it took; its arrays cannot be written to.
 
     Attributes
     ----------
@@ -102,14 +103,14 @@ class Result:
     @cached_property
     def _estimate(self) -> tuple[NDArray[np.float32], float]:
         if self._differences is None:
-            return np.full_like(self.image, np.nan), np.nan
+            return immutable(np.full_like(self.image, np.nan)), np.nan
         errors, relative_mse = estimate(
             self._differences,
             self.image.astype(np.float64),
             self._growth,
             independent=self.sampler == "independent",
         )
-        return errors.astype(np.float32), relative_mse
+        return immutable(errors.astype(np.float32)), relative_mse
 
     def denoise(self) -> Result:
         """Denoise the image by Open Image Denoise, guided by albedo and normal if it has them.

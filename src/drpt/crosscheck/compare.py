@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from drpt.immutable import Immutable
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -46,7 +48,7 @@ class Value(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class ImageTest:
+class ImageTest(Immutable):
     """The test of the images' means; arrays are (3,), one value for each channel.
 
     Attributes
@@ -111,7 +113,7 @@ class Block(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class BlockTest:
+class BlockTest(Immutable):
     """The test of all blocks.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 
 from drpt.crosscheck.convert import to_mitsuba
 from drpt.crosscheck.variant import scoped_variant
+from drpt.immutable import Immutable
 from drpt.kernel import backend
 from drpt.render import Mode, Rendering
 
@@ -32,7 +33,7 @@ LAUNCH_PATHS = 2**24
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(Immutable):
     """An image that is the mean of independent passes.
 
     Attributes

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import drjit as dr
 import numpy as np
 
+from drpt.immutable import immutable
 from drpt.kernel.backend import interrupts_put_off
 from drpt.kernel.brdf import make_brdf
 from drpt.kernel.camera import make_camera
@@ -89,7 +90,7 @@ def first_hits(
         "normal": mean(_NormalTracer(*estimator)),
         "depth": np.divide(far, share, out=np.full_like(far, np.inf), where=share > 0),
     }
-    return {name: layer.astype(np.float32) for name, layer in layers.items()}
+    return {name: immutable(layer.astype(np.float32)) for name, layer in layers.items()}
 
 
 def _features(primitives: Primitives) -> Features:

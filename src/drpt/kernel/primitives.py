@@ -87,6 +87,12 @@ class Primitives:
     radiance: Array
     shape: NDArray[np.intp]
 
+    def __post_init__(self) -> None:
+        """Make the arrays read-only: renders of the same shapes share them."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
     @property
     def first_sphere(self) -> int:
         """Number of the first sphere; smooth triangles stand just before it."""

@@ -5,12 +5,13 @@ The tracer is that of the renders; here it stops at every vertex and says what i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import drjit as dr
 import numpy as np
 
+from drpt.immutable import Immutable
 from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import Ray
 from drpt.kernel.intersect import closest_hit
@@ -28,7 +29,8 @@ NONE = -1
 """Stands for the number of a shape where there is none."""
 
 
-class Vertices(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Vertices(Immutable):
     """The vertices of some paths: arrays (depths, paths) and (depths, paths, 3).
 
     Attributes
@@ -79,7 +81,10 @@ def record(launcher: Launcher, pixel: int, samples: range, seed: int) -> Vertice
         vertices, path = recorder.step(path, sampler, own, number)
         found.append(vertices)
         sampler = own
-    return Vertices(*map(np.stack, zip(*found, strict=True))) if found else _none(len(samples))
+    if not found:
+        return _none(len(samples))
+    names = [field.name for field in fields(Vertices)]
+    return Vertices(**{name: np.stack([getattr(one, name) for one in found]) for name in names})
 
 
 @dataclass

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from numbers import Real
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard
 
 import numpy as np
 
+from drpt.immutable import immutable
 from drpt.messages import one_line, shortened
 
 if TYPE_CHECKING:
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
 
 RGB = tuple[float, float, float]
 Point = tuple[float, float, float]
-
-_Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 
 MAX_LENGTH = 1e9
 """Largest coordinate and radius: the square of an area between two such points, about
@@ -156,24 +155,19 @@ def pixels(field: str, value: object) -> int:
 
 
 def vectors(field: str, value: ArrayLike) -> NDArray[np.float64]:
-    """Return `value` as a new read-only float64 array of shape (n, 3), n > 0, all finite."""
-    array = _rows(field, value, "fiu", "numbers").astype(np.float64, order="C")
+    """Return `value` as an immutable float64 array of shape (n, 3), n > 0, all finite."""
+    rows = _rows(field, value, "fiu", "numbers")
+    array = immutable(rows.astype(np.float64, order="C", copy=False))
     _refuse_first_bad_row(field, array, np.abs(array) <= MAX_LENGTH, f"numbers {COORDINATE.words}")
-    return read_only(array)
+    return array
 
 
 def indices(field: str, value: ArrayLike, count: int) -> NDArray[np.int32]:
-    """Return `value` as a new read-only int32 array of shape (m, 3), m > 0, in [0, count)."""
+    """Return `value` as an immutable int32 array of shape (m, 3), m > 0, in [0, count)."""
     array = _rows(field, value, "iu", "whole numbers")
     inside = (array >= 0) & (array < count)
     _refuse_first_bad_row(field, array, inside, f"vertex indices from 0 to {count - 1}")
-    return read_only(array.astype(np.int32, order="C"))
-
-
-def read_only(array: _Array) -> _Array:
-    """Forbid writing to `array`, and return it."""
-    array.flags.writeable = False
-    return array
+    return immutable(array.astype(np.int32, order="C", copy=False))
 
 
 def _scalar(value: object) -> object:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from drpt.immutable import Immutable, immutable
 from drpt.scene import checks
 from drpt.scene.checks import RGB, Point, SceneError
 
@@ -186,11 +187,12 @@ class Sphere(_Surface):
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Mesh(_Surface):
+class Mesh(_Surface, Immutable):
     """A triangle mesh, with a material or, as a light, a radiance.
 
     A triangle's front is where its vertices are seen counter-clockwise. A triangle without area
-    is never hit. The arrays are copied, and read-only.
+    is never hit. The arrays are copied, and cannot be written to; nor can those of a copy or an
+    unpickled mesh.
 
     Parameters
     ----------
@@ -366,7 +368,7 @@ def _unit_normals(normals: ArrayLike, count: int) -> NDArray[np.float64]:
         row = int(np.flatnonzero(lengths == 0)[0])
         raise checks.refuse(f"normals[{row}]", tuple(vectors[row].tolist()), "longer than 0")
     unit = np.where(np.abs(lengths - 1) < UNIT_TOLERANCE, vectors, vectors / lengths)
-    return checks.read_only(unit)
+    return immutable(unit)
 
 
 def _equal_normals(first: NDArray[np.float64] | None, second: NDArray[np.float64] | None) -> bool:

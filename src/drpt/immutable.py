@@ -1,0 +1,66 @@
+"""Arrays that cannot be written to, and dataclasses whose arrays are always such.
+
+NumPy's flag ``writeable`` is no protection: whoever has an array that owns its memory can set it
+again, and a copy or an unpickled array has it set. So the memory here is that of a `bytes` object,
+of a class of its own: NumPy unpickles arrays into plain `bytes`, and lets them be written to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
+_Class = TypeVar("_Class")
+
+
+def immutable(array: _Array) -> _Array:
+    """Return an array whose values cannot change: `array` itself if it is such, else a copy."""
+    if _is_immutable(array):
+        return array
+    return np.ndarray(array.shape, array.dtype, _Memory(array.tobytes()))  # type: ignore[return-value]
+
+
+class _Memory(bytes):
+    """The memory of an immutable array."""
+
+
+class Immutable:
+    """Base of frozen dataclasses: their arrays are immutable, whatever made them.
+
+    That holds for arrays in a dictionary, too. Copies and unpickled objects are made by the class,
+    from their fields.
+    """
+
+    def __post_init__(self) -> None:
+        for name, value in _values(self).items():
+            object.__setattr__(self, name, _frozen(value))
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[type, dict[str, Any]]]:
+        return make, (type(self), _values(self))
+
+
+def make(kind: type[_Class], values: dict[str, Any]) -> _Class:
+    """Make a dataclass from its fields: what `pickle` and `copy` call."""
+    return kind(**values)
+
+
+def _values(instance: Any) -> dict[str, Any]:
+    return {field.name: getattr(instance, field.name) for field in fields(instance)}
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _frozen(item) for key, item in value.items()}
+    return immutable(value) if isinstance(value, np.ndarray) else value
+
+
+def _is_immutable(array: object) -> bool:
+    while isinstance(array, np.ndarray):
+        array = array.base
+    return isinstance(array, _Memory)
