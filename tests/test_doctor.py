@@ -34,7 +34,7 @@ CHOSEN = backend.Backend(
     vector_width=8,
     threads=4,
     cuda=False,
-    cache=Path("/home/someone/.drjit"),
+    cache=Path("/home/someone/kernels"),
     cache_writable=True,
 )
 
@@ -159,16 +159,27 @@ class TestCuda:
 class TestCache:
     def test_is_named(self, examine: Callable[..., doctor.Report]) -> None:
         report = examine()
-        assert found_as(report, "cache folder") == ["/home/someone/.drjit"]
+        assert found_as(report, "cache folder") == ["/home/someone/kernels (0 kernels, 0.0 MiB)"]
         assert report.notes == []
+
+    def test_tells_its_size(self, tmp_path: Path, examine: Callable[..., doctor.Report]) -> None:
+        for name in ("a.bin", "b.bin", "sweep.stamp"):
+            (tmp_path / name).write_bytes(bytes(2**20))
+        says = f"{tmp_path} (2 kernels, 2.0 MiB)"
+        assert found_as(examine(cache=tmp_path), "cache folder") == [says]
 
     @pytest.mark.parametrize(
         ("cache", "why"),
-        [(None, "HOME is not set"), (CHOSEN.cache, "/home/someone/.drjit is not writable")],
+        [(None, "/no/kernels is not writable"), (CHOSEN.cache, f"{CHOSEN.cache} is not writable")],
     )
     def test_that_keeps_nothing_is_noted(
-        self, cache: Path | None, why: str, examine: Callable[..., doctor.Report]
+        self,
+        cache: Path | None,
+        why: str,
+        examine: Callable[..., doctor.Report],
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
+        monkeypatch.setenv("DRJIT_CACHE_DIR", "/no/kernels")
         report = examine(cache=cache, cache_writable=False)
         (note,) = report.notes
         assert note.startswith(f"{why}, so that every run compiles anew")

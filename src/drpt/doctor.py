@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, requires, version
 from time import perf_counter
@@ -143,12 +144,25 @@ def _look_at_cuda(found: Report, chosen: backend.Backend | None) -> None:
 
 
 def _look_at_cache(found: Report, chosen: backend.Backend) -> None:
-    found.rows.append(("cache folder", "none" if chosen.cache is None else str(chosen.cache)))
+    cache = chosen.cache
+    what = "none" if cache is None else f"{cache} ({_kernels(cache)})"
+    found.rows.append(("cache folder", what))
     if not chosen.cache_writable:
-        why = "HOME is not set" if chosen.cache is None else f"{chosen.cache} is not writable"
+        folder = cache or os.environ.get(backend.CACHE_VARIABLE)
+        why = f"{folder} is not writable" if folder else "HOME is not set"
         found.notes.append(
-            f"{why}, so that every run compiles anew: name a writable folder in DRJIT_CACHE_DIR"
+            f"{why}, so that every run compiles anew: "
+            f"name a writable folder in {backend.CACHE_VARIABLE}"
         )
+
+
+def _kernels(folder: Path) -> str:
+    """Say how many compiled kernels a folder holds, and their size."""
+    sizes = []
+    for file in folder.glob("*.bin"):
+        with suppress(FileNotFoundError):  # another process has just removed it
+            sizes.append(file.stat().st_size)
+    return f"{len(sizes)} kernel{'' if len(sizes) == 1 else 's'}, {sum(sizes) / 2**20:.1f} MiB"
 
 
 def _look_at_packages(found: Report) -> None:

@@ -166,3 +166,50 @@ def test_loading_in_a_thread() -> None:
 def test_thread_count_must_be_positive() -> None:
     with pytest.raises(ValueError, match="at least 1, got 0"):
         backend.set_thread_count(0)
+
+
+RENDER = """
+import drpt
+scene = drpt.load_scene("cornell-box").resized(2, 2)
+print(drpt.render(scene, spp=1, bounces=0).image.shape)
+"""
+
+
+def kernels_in(folder: Path) -> list[Path]:
+    return list(folder.glob("*.bin"))
+
+
+def test_kernels_have_a_folder_of_their_own(tmp_path: Path) -> None:
+    unset = {"DRJIT_CACHE_DIR": "", "XDG_CACHE_HOME": ""}
+    assert last_line(run(RENDER, HOME=str(tmp_path), **unset)) == "(2, 2, 3)"
+    assert [path.name for path in tmp_path.iterdir()] == [".cache"]
+    assert kernels_in(tmp_path / ".cache/drpt/kernels")
+
+
+def test_a_folder_that_is_named_is_left_alone(tmp_path: Path) -> None:
+    named = {"DRJIT_CACHE_DIR": str(tmp_path / "named"), "DRJIT_CACHE_MAXSIZE": "5M"}
+    ask = "import os; print(os.environ['DRJIT_CACHE_DIR'], os.environ['DRJIT_CACHE_MAXSIZE'])"
+    done = run(RENDER + ask, HOME=str(tmp_path), **named)
+    assert last_line(done) == f"{tmp_path / 'named'} 5M"
+    assert kernels_in(tmp_path / "named")
+    assert [path.name for path in tmp_path.iterdir()] == ["named"]
+
+
+def test_kernels_that_were_used_least_recently_go(tmp_path: Path) -> None:
+    folder = tmp_path / "drpt/kernels"
+    folder.mkdir(parents=True)
+    for age in range(3):
+        path = folder / f"{age}.bin"
+        with path.open("wb") as file:
+            file.truncate(2**29)  # half of what may be there, and nothing on the disk
+        os.utime(path, (10**9 - age, 10**9 - age))
+    run(RENDER + "import time; time.sleep(1)", DRJIT_CACHE_DIR="", XDG_CACHE_HOME=str(tmp_path))
+    stays = [path.stem for path in kernels_in(folder)]
+    assert [name for name in stays if name in "012"] == ["0"]
+    assert len(stays) > 1
+
+
+def test_it_renders_without_a_folder() -> None:
+    done = run(RENDER, DRJIT_CACHE_DIR="", XDG_CACHE_HOME="/dev/null")
+    assert done.stdout == "(2, 2, 3)\n"
+    assert "Traceback" not in done.stderr

@@ -1,4 +1,4 @@
-"""Chooses Dr.Jit's backend, and the LLVM library before Dr.Jit loads one by itself.
+"""Chooses Dr.Jit's backend, its LLVM library and its folder for kernels, before it is imported.
 
 Importing this module does not import Dr.Jit. Whatever imports Dr.Jit or Mitsuba calls :func:`load`
 first; both then use the same LLVM.
@@ -30,6 +30,12 @@ __all__ = [
 
 VARIABLE = "DRPT_BACKEND"
 """The environment variable that names a backend."""
+CACHE_VARIABLE = "DRJIT_CACHE_DIR"
+"""The environment variable that names the folder for compiled kernels."""
+CACHE_SIZE_VARIABLE = "DRJIT_CACHE_MAXSIZE"
+"""The environment variable that bounds it; Dr.Jit looks once an hour, when it is imported."""
+CACHE_SIZE = 2**30
+"""Bytes of compiled kernels that stay; the least recently used ones go."""
 
 NAMES = ("llvm", "cuda")
 
@@ -70,6 +76,7 @@ def load(name: str | None = None) -> ModuleType:
         raise ValueError(f"{what} must be one of {', '.join(NAMES)}, got {name!r}")
     if "drjit" not in sys.modules:
         _name_library(optional=name != "llvm" and _has_cuda_driver())
+        _name_cache_folder()
         _import_drjit()
     name = name or ("cuda" if _works("CUDA") else "llvm")
     if name == "cuda" and not _works("CUDA"):
@@ -121,7 +128,7 @@ def describe() -> Backend:
         threads=dr.thread_count(),
         cuda=_works("CUDA"),
         cache=cache,
-        cache_writable=cache is not None and _writable(cache),
+        cache_writable=cache is not None and os.access(cache, os.W_OK | os.X_OK),
     )
 
 
@@ -133,6 +140,16 @@ def _name_library(*, optional: bool) -> None:
             raise
     else:
         os.environ[llvm.VARIABLE] = str(library.path)
+
+
+def _name_cache_folder() -> None:
+    """Give the kernels a folder of their own and a bound, unless somebody has named one."""
+    from platformdirs import user_cache_path
+
+    folder = user_cache_path("drpt", appauthor=False) / "kernels"
+    if folder.is_absolute() and not os.environ.get(CACHE_VARIABLE):  # "~" where nobody is at home
+        os.environ[CACHE_VARIABLE] = str(folder)
+        os.environ.setdefault(CACHE_SIZE_VARIABLE, str(CACHE_SIZE))
 
 
 def _import_drjit() -> None:
@@ -176,21 +193,20 @@ def _has_cuda_driver() -> bool:
 
 
 def _vector_width() -> int:
-    """Return the lanes of a float vector; Dr.Jit tells them in C++ only."""
-    import drjit as dr
-
-    core = next(Path(dr.__file__).parent.glob("libdrjit-core.*"))
-    return int(ctypes.CDLL(str(core))["_Z21jit_llvm_vector_widthv"]())
+    """Return the lanes of a float vector."""
+    return int(_drjit_core()["_Z21jit_llvm_vector_widthv"]())
 
 
 def _cache_folder() -> Path | None:
-    """Return where Dr.Jit keeps compiled kernels: it keeps none without a home folder."""
-    if folder := os.environ.get("DRJIT_CACHE_DIR"):
-        return Path(folder)
-    home = os.environ.get("HOME")
-    return Path(home) / ".drjit" if home else None
+    """Return where Dr.Jit keeps compiled kernels; None if it keeps none."""
+    function = _drjit_core()["_Z13jit_cache_dirv"]
+    function.restype = ctypes.c_char_p
+    folder: bytes | None = function()
+    return Path(os.fsdecode(folder)) if folder else None
 
 
-def _writable(folder: Path) -> bool:
-    existing = next(place for place in (folder, *folder.parents) if place.exists())
-    return os.access(existing, os.W_OK | os.X_OK)
+def _drjit_core() -> ctypes.CDLL:
+    """Return Dr.Jit's library, some of whose functions Python cannot call otherwise."""
+    import drjit as dr
+
+    return ctypes.CDLL(str(next(Path(dr.__file__).parent.glob("libdrjit-core.*"))))

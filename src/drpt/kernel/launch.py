@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import DeviceCamera, make_camera
+from drpt.kernel.compiled import COMPILED
 from drpt.kernel.coverage import covering_facets
 from drpt.kernel.device_scene import DeviceScene, upload
 from drpt.kernel.estimator import Features
@@ -79,6 +80,7 @@ class Launcher:
     jitter: bool
     paths_per_ray: int
     primitives: Primitives
+    _token: object = field(default_factory=object, init=False)
 
     def launch(self, pixels: range, samples: range, run: int, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range, in runs of so many after each other.
@@ -141,6 +143,7 @@ class Launcher:
         return Sums(by_pixel, _total(totals.rays), _total(totals.non_finite))
 
     def _lanes(self, work: Work) -> Lanes:
+        COMPILED.use(self._token)
         index = self.tracer.scene.types.UInt32
         return Lanes(
             self.tracer,
