@@ -13,6 +13,7 @@ from drpt.crosscheck.compare import Comparison, compare
 from drpt.crosscheck.estimate import measure
 from drpt.crosscheck.flip import has_flip, mean_flip
 from drpt.crosscheck.references import SPP, Reference
+from drpt.immutable import immutable
 from drpt.render import Mode
 from drpt.scene import Phong, Scene
 
@@ -166,7 +167,7 @@ def samples_needed(scene: Scene, bounces: int, mode: Mode) -> int:
 @lru_cache(maxsize=1)  # the modes of a check share them
 def light_edges(scene: Scene, spp: int) -> NDArray[np.bool_]:
     """Pixels (height, width) that show the edge of a light, as far as so many samples tell."""
-    return np.asarray(measure(scene, spp, 0).variance.max(axis=2) > 0)
+    return immutable(measure(scene, spp, 0).variance.max(axis=2) > 0)
 
 
 def _percent(value: float, whole: float) -> str:

@@ -156,12 +156,14 @@ def ray_offset(scene: Scene) -> float:
     """Return how far off a surface Mitsuba's rays start at the most, relative to the scene's size.
 
     They start 1500 u (1 + max|p|) off a point p (``RayEpsilon`` in ``math.h``, ``offset_p`` in
-    ``interaction.h``). The size is the longest side of the box around all shapes.
+    ``interaction.h``). The size is the longest side of the box around all shapes. Infinite where
+    all shapes are in one point.
     """
     low, high = np.transpose([_bounds(shape) for shape in scene.shapes], (1, 0, 2))
     low, high = low.min(axis=0), high.max(axis=0)
     reach = max(np.abs(low).max(), np.abs(high).max())
-    return float(1500 * UNIT * (1 + reach) / (high - low).max())
+    size = float((high - low).max())
+    return 1500 * UNIT * float(1 + reach) / size if size else np.inf
 
 
 def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -94,10 +94,13 @@ def first_hits(
 
 
 def _features(primitives: Primitives) -> Features:
-    """What first hits need: all surfaces, whether there is light on them or not."""
+    """What first hits need: all surfaces, whether there is light on them or not.
+
+    Where there is no surface, as of shapes without area, nothing is traced.
+    """
     return replace(
         Features.of(primitives, 0, Mode.IMPLICIT),
-        emission=True,
+        emission=len(primitives.shape) > 0,
         spheres=len(primitives.spheres) > 0,
         triangles=len(primitives.planes) > 0,
         interpolated_normals=len(primitives.smooth_corners) > 0,
