@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from drpt.immutable import Immutable, immutable
 from tests.scenes import LAMP, scene_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -38,8 +39,12 @@ def _through_buffers(value: Any) -> Any:
     return pickle.loads(text, buffers=[bytearray(buffer.raw()) for buffer in buffers])
 
 
-WAYS = {
-    **{f"pickle {n}": lambda x, n=n: pickle.loads(pickle.dumps(x, n)) for n in range(6)},
+def _through(protocol: int, value: Any) -> Any:
+    return pickle.loads(pickle.dumps(value, protocol))
+
+
+WAYS: dict[str, Callable[[Any], Any]] = {
+    **{f"pickle {protocol}": partial(_through, protocol) for protocol in range(6)},
     "buffers": _through_buffers,
     "copy": copy.copy,
     "deepcopy": copy.deepcopy,
@@ -154,7 +159,7 @@ def test_what_is_prepared_is_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         primitives.light_corners[:] = 0
     with pytest.raises(ValueError, match="read-only"):
-        primitives.spheres *= 2
+        primitives.spheres[:] *= 2
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def bits_of_all(*, fast: bool) -> list[bytes]:
         arrays: list[np.ndarray[Any, Any]] = [
             rendering.result().image,
             rendering.sample(3, 4, 2),
-            *rendering.vertices(3, 4, 4),
+            *vars(rendering.vertices(3, 4, 4)).values(),
             *rendering.first_hits().values(),
             np.array(rendering.launcher.operations()),
         ]
