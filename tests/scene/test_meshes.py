@@ -11,6 +11,7 @@ from drpt.scene import Diffuse, Mesh, SceneError
 from drpt.scene.meshes import MeshArrays, load_mesh
 
 VERTICES: list[list[float]] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 2, 1]]
+PENTAGON = "v 0 0 0\nv 2 0 0\nv 3 1 0\nv 2 2 0\nv 0 2 0\n"
 V = "".join(f"v {x} {y} {z}\n" for x, y, z in VERTICES)
 VN = "vn 0 0 1\nvn 0 1 0\n"
 NORMALS = [[0, 0, 1], [0, 1, 0]]
@@ -59,7 +60,6 @@ def positions(*faces: list[int]) -> list[list[list[float]]]:
         ("f 1 2 \\\n 3", [[0, 1, 2]]),
         ("\tf  1\t2 3", [[0, 1, 2]]),
         ("f 1 2 4 3", [[0, 1, 3], [3, 2, 0]]),
-        ("f 1 2 3 4 5", [[0, 1, 2], [0, 2, 3], [0, 3, 4]]),
         ("f 1 2 4 3\nf 1 2 5", [[0, 1, 3], [3, 2, 0], [0, 1, 4]]),
         ("mtllib no.mtl\nusemtl a\nf 1 2 3\no x\nusemtl b\ng y\nf 3 2 4", [[0, 1, 2], [2, 1, 3]]),
     ],
@@ -96,8 +96,13 @@ def test_obj_normals_belong_to_corners(tmp_path: Path, faces: str) -> None:
     assert mesh.normals[mesh.faces].tolist() == [[first, first, second], [second, first, second]]
 
 
+def test_obj_polygons(tmp_path: Path) -> None:
+    mesh = load(tmp_path, "a.obj", f"{PENTAGON}f 1 2 3 4 5")
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 4]]
+
+
 def test_obj_polygons_with_normals(tmp_path: Path) -> None:
-    mesh = load(tmp_path, "a.obj", V + VN + "f 1//1 2//1 3//2 4//2 5//1")
+    mesh = load(tmp_path, "a.obj", PENTAGON + VN + "f 1//1 2//1 3//2 4//2 5//1")
     first, second = NORMALS
     assert mesh.normals is not None
     assert mesh.normals[mesh.faces[:, 1]].tolist() == [first, second, second]
@@ -114,7 +119,10 @@ def test_decimals_are_read_as_float64(tmp_path: Path) -> None:
         (["3 0 1 2", "3 1 3 2"], [[0, 1, 2], [1, 3, 2]]),
         (["4 0 1 3 2"], [[0, 1, 3], [3, 2, 0]]),
         (["4 0 1 3 2", "3 0 1 4"], [[0, 1, 4], [0, 1, 3], [3, 2, 0]]),
-        (["5 0 1 2 3 4"], [[0, 1, 2], [0, 2, 3], [0, 3, 4]]),
+        (
+            ["4 0 1 3 2", "3 0 1 4", "4 0 1 3 2"],
+            [[0, 1, 4], [0, 1, 3], [0, 1, 3], *[[3, 2, 0]] * 2],
+        ),
     ],
 )
 def test_ascii_ply(tmp_path: Path, rows: list[str], expected: list[list[int]]) -> None:
@@ -253,3 +261,87 @@ def test_bad_arrays_name_the_file(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as caught:
         Mesh.load(tmp_path / "a.npz", radiance=1)
     assert str(caught.value).startswith(f"{tmp_path / 'a.npz'}: faces[0]: (0, 1, 3)")
+
+
+L_SHAPE = np.array([[2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0], [0, 0, 0]], np.float64)
+"""A concave polygon of area 3; its fans from two of six corners are right."""
+
+
+def area_vectors(mesh: MeshArrays) -> np.ndarray:
+    a, b, c = mesh.vertices[mesh.faces].swapaxes(0, 1)
+    areas: np.ndarray = np.cross(b - a, c - a) / 2
+    return areas
+
+
+@pytest.mark.parametrize("first", range(6))
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("kind", ["obj", "normals.obj", "ply", "mixed.ply", "binary.ply"])
+def test_concave_polygons(tmp_path: Path, kind: str, side: int, first: int) -> None:
+    points = np.roll(L_SHAPE, first, axis=0)[::side]
+    rows = "\n".join(" ".join(map(str, point)) for point in points)
+    if kind.endswith("obj"):
+        corner = "{}//{}" if kind.startswith("normals") else "{}"
+        v = "v " + rows.replace("\n", "\nv ") + "\nv 9 9 9\n"
+        vn = "".join(f"vn {i} 1 0\n" for i in range(6)) if "{}//{}" in corner else ""
+        content: str | bytes = f"{v}{vn}f {' '.join(corner.format(i, i) for i in range(1, 7))}\n"
+    elif kind == "binary.ply":
+        head = ply(1, vertices=6, encoding="binary_little_endian").encode()
+        content = head + points.astype("<f4").tobytes() + struct.pack("<B6i", 6, *range(6))
+    else:
+        more = "3 0 1 1\n" if kind == "mixed.ply" else ""
+        content = ply(1 + bool(more), vertices=6) + f"{rows}\n6 0 1 2 3 4 5\n{more}"
+    mesh = load(tmp_path, f"a-{kind}" if "." in kind else f"a.{kind}", content)
+    areas = area_vectors(mesh)
+    areas = areas[np.abs(areas).max(axis=1) > 0]
+    assert len(areas) == 4
+    assert areas[:, :2].tolist() == [[0, 0]] * 4
+    assert (side * areas[:, 2] > 0).all()
+    assert areas[:, 2].sum() == side * 3
+    if mesh.normals is not None:
+        number = [points.tolist().index(place) for place in mesh.vertices.tolist()]
+        assert mesh.normals[:, 0].tolist() == number
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "place"),
+    [
+        ("a.obj", f"{V}f 1 2 3\nf 1 4 2 3\nf 1 4 2 3\n", "line 7"),
+        ("a.obj", f"{V}f 1 2 3\nf 1 4 2 3 # x\nf 1 3 2 4\nf 1 2 3\n", "line 7"),
+        ("a.ply", ply(3) + ROWS + "3 0 1 2\n4 0 3 1 2\n4 0 3 1 2\n", "line 16"),
+        ("a.ply", ply(2) + ROWS + "4 0 3 1 2\n4 0 3 1 2\n", "line 15"),
+    ],
+)
+def test_polygons_that_intersect_themselves_are_named(
+    tmp_path: Path, name: str, content: str, place: str
+) -> None:
+    words = rf"a\....: {place}: this polygon intersects itself \(the first of 2\)$"
+    with pytest.warns(UserWarning, match=words):
+        load(tmp_path, name, content)
+
+
+def test_polygons_far_from_planar_are_named(tmp_path: Path) -> None:
+    bent = f"{V}v 1 1 1\nf 1 2 3\nf 1 2 6 3\n"
+    with pytest.warns(UserWarning, match=r"a\.obj: line 8: this polygon is far from planar$"):
+        load(tmp_path, "a.obj", bent)
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], ">f4").tobytes()
+    head = ply(1, vertices=4, encoding="binary_big_endian").encode()
+    with pytest.warns(UserWarning, match=r"a\.ply: face 0: this polygon is far from planar$"):
+        load(tmp_path, "a.ply", head + vertices + struct.pack(">B4i", 4, 0, 1, 3, 2))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("a.obj", f"{V}f 1 2 3 4\nf 1 2 3 9", "line 7: '9' is not allowed; it must be one of 5"),
+        ("a.obj", f"v 0 x 0\n{V}f 1 2 3 4", "this is no readable OBJ file: could not convert"),
+        ("a.obj", "f 1 2 3 4", "it has no vertices"),
+        ("a.ply", ply(2) + ROWS + "4 0 1 3 2\n4 0 1 2 5\n", "line 16: 5 is not allowed; it must"),
+        ("a.ply", ply(2) + ROWS + "3 0 1 2\n4 0 1 2 -1\n", "line 16: -1 is not allowed"),
+    ],
+)
+def test_polygons_without_their_vertices(
+    tmp_path: Path, name: str, content: str, problem: str
+) -> None:
+    with pytest.raises(SceneError) as caught:
+        load(tmp_path, name, content)
+    assert f"{name}: {problem}" in str(caught.value)
