@@ -413,6 +413,54 @@ class TestLock:
         passes.close()
         assert rendering_of(path).spp == 16
 
+    def test_the_lock_is_beside_the_file_and_goes_with_the_render(self, path: Path) -> None:
+        rendering = rendering_of(path)
+        assert [found.suffix for found in path.parent.iterdir()] == [".lock"]
+        finish(rendering)
+        assert list(path.parent.iterdir()) == [path]
+
+    def test_a_link_to_the_file_has_its_lock(self, path: Path, tmp_path: Path) -> None:
+        (tmp_path / "elsewhere").mkdir()
+        link = tmp_path / "elsewhere" / "link.drpt"
+        link.symlink_to(path)
+        rendering = rendering_of(path)
+        with pytest.raises(CheckpointError, match=r"link\.drpt: another render is using it"):
+            rendering_of(link)
+        finish(rendering)
+
+    def test_where_nothing_can_be_locked_that_is_said(
+        self, path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def fail(_: int) -> bool:
+            raise OSError(37, "No locks available")
+
+        monkeypatch.setattr("drpt.files.locking.try_lock", fail)
+        with pytest.raises(CheckpointError, match=r"state\.drpt: it cannot be locked .*available"):
+            rendering_of(path)
+        assert list(path.parent.iterdir()) == []
+
+    def test_a_process_with_another_temporary_folder_is_kept_off(
+        self, path: Path, tmp_path: Path
+    ) -> None:
+        passes = rendering_of(path).passes()
+        next(passes)
+        (tmp_path / "other").mkdir()
+        code = f"""
+import pathlib
+from drpt.checkpoint import Checkpoint, CheckpointError
+try:
+    Checkpoint(pathlib.Path({str(path)!r}), {{}}, 1).lock()
+except CheckpointError as error:
+    print(error)
+"""
+        environment = {**os.environ, "TMPDIR": str(tmp_path / "other")}
+        ran = subprocess.run(
+            [sys.executable, "-c", code], env=environment, stdout=-1, text=True, check=True
+        )
+        assert ran.stdout == f"{path}: another render is using it\n"
+        assert list((tmp_path / "other").iterdir()) == []
+        passes.close()
+
     def test_a_callback_that_raises_leaves_a_checkpoint_and_no_lock(self, path: Path) -> None:
         def fail(_: drpt.Result) -> None:
             raise KeyboardInterrupt
@@ -473,7 +521,7 @@ class TestPlaces:
         with pytest.warns(RuntimeWarning, match="could not be written .No space left on device"):
             next(passes)
         assert path.read_bytes() == before
-        assert list(path.parent.iterdir()) == [path]
+        assert not list(path.parent.glob(".drpt-*.tmp"))
         monkeypatch.undo()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

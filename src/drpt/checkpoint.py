@@ -9,21 +9,19 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 import zipfile
-from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drpt.files import replacing
+from drpt.files import PathLock, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
     from typing import BinaryIO
 
-    from filelock import BaseFileLock
     from numpy.typing import NDArray
 
     Facts = Mapping[str, str | int | float | bool | list[int] | list[float] | None]
@@ -56,18 +54,16 @@ class Checkpoint:
         self._identity = dict(identity)
         self._interval = interval
         self._last = monotonic()
-        self._token = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:16]
-        self._lock = _machine_lock(self._token)
+        self._lock = PathLock(_lock_path(path))
 
     def lock(self) -> None:
-        """Keep other processes off until :meth:`unlock`; raises `CheckpointError` if one is on."""
-        from filelock import Timeout
-
-        if not self._lock.is_locked:
-            try:
-                self._lock.acquire(timeout=0)
-            except Timeout:
-                raise CheckpointError(f"{self.path}: another render is using it") from None
+        """Keep others off until :meth:`unlock`; raises `CheckpointError` where that fails."""
+        try:
+            if not self._lock.is_held and not self._lock.acquire():
+                raise CheckpointError(f"{self.path}: another render is using it")
+        except OSError as error:
+            problem = f"it cannot be locked against other renders ({error.strerror})"
+            raise CheckpointError(f"{self.path}: {problem}; keep it in another folder") from error
 
     def unlock(self) -> None:
         """Let others have it."""
@@ -91,7 +87,7 @@ class Checkpoint:
     def save(self, facts: Facts, arrays: Arrays) -> None:
         """Replace what was saved before; raises `OSError` where that fails."""
         text = json.dumps({"identity": self._identity, "facts": facts})
-        with replacing(self.path, token=self._token) as stream:
+        with replacing(self.path) as stream:
             stream.write(MAGIC.ljust(BODY, b"\0"))
             np.savez(stream, allow_pickle=False, state=np.array(text), **arrays)
             digest = _digest(stream)
@@ -100,12 +96,11 @@ class Checkpoint:
         self._last = monotonic()
 
 
-def _machine_lock(token: str) -> BaseFileLock:
-    """A lock of this user on this machine; its empty file stays, away from the checkpoint."""
-    from filelock import FileLock
-
-    user = os.getuid() if hasattr(os, "getuid") else 0
-    return FileLock(Path(tempfile.gettempdir(), f"drpt-{user}-{token}.lock"))
+def _lock_path(path: Path) -> Path:
+    """Beside the file itself, wherever links to it are; of a name that is not too long."""
+    file = path.resolve()
+    token = hashlib.sha256(os.fsencode(file.name)).hexdigest()[:16]
+    return file.with_name(f".drpt-{token}.lock")
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -1,3 +1,4 @@
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -44,10 +45,10 @@ def test_a_failure_leaves_the_old_scene(tmp_path: Path, monkeypatch: pytest.Monk
     SCENE.save(path)
     before = files(tmp_path)
 
-    def fail(self: Path, target: Path) -> None:
+    def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "replace", fail)
+    monkeypatch.setattr(os, "replace", fail)
     with pytest.raises(SceneError, match=r"x\.toml: it cannot be written: No space left on device"):
         Scene(CAMERA, [Mesh(np.eye(3), [[0, 1, 2]], radiance=1)]).save(path)
     assert files(tmp_path) == before

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from drpt.crosscheck.convert import surface, to_mitsuba_dict
 from drpt.crosscheck.variant import load_mitsuba
+from drpt.files import write_file
 from drpt.scene import Mesh, Phong, SceneError, checks
-from drpt.scene.saving import replace_file
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -50,7 +50,8 @@ def to_mitsuba_xml(scene: Scene, path: str | PathLike[str], bounces: int = 3) ->
     try:
         _write(mi, scene, Path(path), bounces)
     except (OSError, ValueError) as error:
-        problem = f"it cannot be written: {getattr(error, 'strerror', error)}"
+        cause = error.__cause__ or error
+        problem = f"it cannot be written: {getattr(cause, 'strerror', cause)}"
         raise SceneError(problem, source=str(path)) from None
 
 
@@ -65,7 +66,7 @@ def _write(mi: Any, scene: Scene, path: Path, bounces: int) -> None:
     table["sensor"]["sampler"]["sample_count"] = SPP
     config = mi.parser.ParserConfig(mi.variant())
     text = mi.parser.write_string(mi.parser.parse_dict(config, table))
-    replace_file(path, text.encode())
+    write_file(path, text.encode())
 
 
 def _write_ply(mi: Any, mesh: Any, folder: Path) -> Path:
@@ -74,7 +75,7 @@ def _write_ply(mi: Any, mesh: Any, folder: Path) -> Path:
     content = stream.raw_buffer()
     file = folder / f"{hashlib.sha256(content).hexdigest()[:16]}.ply"
     folder.mkdir(exist_ok=True)
-    replace_file(file, content)
+    write_file(file, content)
     return file
 
 

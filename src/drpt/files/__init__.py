@@ -1,12 +1,15 @@
 """Files: read only if they are regular and not too large, written whole or not at all."""
 
+from drpt.files.locking import PathLock
 from drpt.files.reading import check_regular, open_regular, read_bytes
-from drpt.files.writing import check_file, replacing
+from drpt.files.writing import check_file, replacing, write_file
 
 __all__ = [
+    "PathLock",
     "check_file",
     "check_regular",
     "open_regular",
     "read_bytes",
     "replacing",
+    "write_file",
 ]

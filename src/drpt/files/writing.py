@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import platform
 import secrets
+import stat
 import tempfile
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from time import time
 from typing import TYPE_CHECKING, BinaryIO
+
+from drpt.files.locking import is_at, open_existing, try_lock
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 BLOCK = 4096
 """Bytes that a disk must have left."""
+ABANDONED_AFTER = 24 * 3600.0
+"""Seconds without a change after which nobody of another host writes a file any more."""
+_HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 
 
 def check_file(path: Path) -> None:
@@ -43,27 +52,87 @@ def check_file(path: Path) -> None:
 
 
 @contextmanager
-def replacing(path: Path, token: str | None = None) -> Iterator[BinaryIO]:
+def replacing(path: Path) -> Iterator[BinaryIO]:
     """Open a new file that takes the place of `path` once it is written without an error.
 
-    Its name until then holds a ``token``, a random one by default. One that is always the same for
-    a path leaves no more than one file behind, however often the process is killed; who gives it
-    sees to it that no other process writes there.
+    Until then it has a name of its own, in the same folder. Its mode is that of the file before,
+    and when it is in place the disk has it. Files that killed processes have left there go.
     """
     target = _target(path)
-    temporary = target.with_name(f".drpt-{token or secrets.token_hex(8)}.tmp")
-    if token:
-        temporary.unlink(missing_ok=True)
     try:
-        with open(temporary, "x+b") as stream:
-            yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, target)
+        _remove_abandoned(target.parent)
+        stream, temporary = _create(target.parent)
+        try:
+            with stream:
+                _keep_mode(stream, target)
+                yield stream
+                stream.flush()
+                os.fsync(stream.fileno())
+                os.replace(temporary, target)
+        finally:
+            temporary.unlink(missing_ok=True)
+        _sync_folder(target.parent)
     except OSError as error:
         raise OSError(f"{path}: it could not be written ({error.strerror or error})") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file as a whole; see `replacing`."""
+    with replacing(path) as stream:
+        stream.write(content)
+
+
+def _create(folder: Path) -> tuple[BinaryIO, Path]:
+    """Make a file that is locked while it is open, so that it is known to be in use."""
+    while True:
+        path = folder / f".drpt-{_HOST}-{secrets.token_hex(8)}.tmp"
+        stream = open(path, "x+b")  # noqa: SIM115 -- the caller closes it
+        try:
+            if try_lock(stream.fileno()) and is_at(stream.fileno(), path):
+                return stream, path
+        except OSError:  # the file system has no locks
+            return stream, path
+        stream.close()  # another process has taken it for abandoned before it was locked
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove files that `_create` has made for processes that have ended."""
+    for path in folder.glob(".drpt-*.tmp"):
+        with suppress(OSError):  # it has gone, or belongs to somebody else
+            descriptor = open_existing(path)
+            try:
+                if _is_abandoned(descriptor, path):
+                    path.unlink()
+            finally:
+                os.close(descriptor)
+
+
+def _is_abandoned(descriptor: int, path: Path) -> bool:
+    """Whether nobody writes a file: nobody of this host locks it, or it is old.
+
+    Locks of other hosts may be unknown here, those of a network's file system above all.
+    """
+    is_old = time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER
+    try:
+        is_free = try_lock(descriptor)
+    except OSError:
+        return is_old
+    return is_free and (is_old or path.name.startswith(f".drpt-{_HOST}-"))
+
+
+def _keep_mode(stream: BinaryIO, target: Path) -> None:
+    with suppress(FileNotFoundError):
+        os.chmod(stream.name, stat.S_IMODE(target.stat().st_mode))
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the disk know the names in a folder, where that can be asked for."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _target(path: Path) -> Path:

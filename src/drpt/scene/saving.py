@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drpt.files import write_file
 from drpt.scene import checks
 from drpt.scene.checks import SceneError
 from drpt.scene.model import Diffuse, Material, Mesh, Scene, Shape
@@ -46,13 +47,15 @@ def save_scene(scene: Scene, path: str | PathLike[str], names: Names | None = No
         content = _npz(mesh)
         file = folder / f"{hashlib.sha256(content).hexdigest()[:16]}.npz"
         folder.mkdir(exist_ok=True)
-        replace_file(file, content)
+        write_file(file, content)
         return {"file": file.relative_to(path.parent).as_posix()}
 
     try:
-        replace_file(path, _toml(scene, save_mesh, names).encode())
+        write_file(path, _toml(scene, save_mesh, names).encode())
     except OSError as error:
-        raise SceneError(f"it cannot be written: {error.strerror}", source=str(path)) from None
+        cause = error.__cause__ or error
+        problem = f"it cannot be written: {getattr(cause, 'strerror', cause)}"
+        raise SceneError(problem, source=str(path)) from None
     except ValueError as error:  # a null character in the path, half a character in a text
         raise SceneError(f"it cannot be written: {error}", source=str(path)) from None
 
@@ -121,13 +124,3 @@ def _npz(mesh: Mesh) -> bytes:
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, v=mesh.vertices, f=mesh.faces, **normals)
     return file.getvalue()
-
-
-def replace_file(path: Path, content: bytes) -> None:
-    """Write a file in one step: it is there as a whole, or as it was before."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
