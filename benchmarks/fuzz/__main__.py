@@ -9,7 +9,10 @@ from pathlib import Path
 from benchmarks.fuzz.harness import OUT, fuzz
 from benchmarks.fuzz.worker import load
 
-TARGETS = ("scenes",)
+TARGETS = (
+    "exr",
+    "scenes",
+)
 """Modules of this package, each with a ``TARGET``."""
 
 

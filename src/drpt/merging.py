@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from drpt.error import relative_mse
+from drpt.messages import one_line
 from drpt.output import read
+from drpt.output.metadata import MOST
 from drpt.result import SAMPLES, STANDARD_ERROR
 
 if TYPE_CHECKING:
@@ -65,7 +67,8 @@ def merge(paths: Sequence[Path]) -> tuple[Layers, Metadata]:
         One is no render with its metadata, or does not fit to those before it.
     """
     first, *others = paths
-    return reduce(_Sums.plus, map(_read, others), _read(first)).divided()
+    with np.errstate(invalid="ignore"):  # pictures may hold infinite values
+        return reduce(_Sums.plus, map(_read, others), _read(first)).divided()
 
 
 def seeds(metadata: Metadata) -> list[str]:
@@ -135,6 +138,7 @@ def _read(path: Path) -> _Sums:
     image = layers["RGB"]
     samples = layers.pop(SAMPLES, np.full(image.shape[:2], metadata["spp"], np.float64))
     errors = layers.pop(STANDARD_ERROR, np.full_like(image, np.nan))
+    _check_layers(path, samples, errors, image)
     return _Sums(
         path,
         dict.fromkeys(seeds(metadata), path),
@@ -142,6 +146,14 @@ def _read(path: Path) -> _Sums:
         {n: _Weighted(layer * _like(samples, layer), samples) for n, layer in layers.items()},
         np.square(errors * _like(samples, errors)),
     )
+
+
+def _check_layers(path: Path, samples: Array, errors: Array, image: Array) -> None:
+    """Refuse layers with the names of drpt's that are something else."""
+    if samples.shape != image.shape[:2] or not ((samples >= 0) & (samples <= MOST)).all():
+        raise ValueError(f"{path}: its layer {SAMPLES} is not one number >= 0 for each pixel")
+    if errors.shape != image.shape or (errors < 0).any():
+        raise ValueError(f"{path}: its layer {STANDARD_ERROR} is not three numbers >= 0 a pixel")
 
 
 def _like(weights: Array, layer: Array) -> Array:
@@ -168,6 +180,10 @@ def _check_fit(sums: _Sums, new: _Sums) -> None:
         value, expected = new.metadata[name], sums.metadata[name]
         if value != expected:
             raise ValueError(f"{new.path}: {name} is {value}, and {expected} in {sums.path}")
+    for name in sorted(new.layers.keys() & sums.layers.keys()):
+        if new.layers[name].sums.ndim != sums.layers[name].sums.ndim:
+            words = f"its layer {name} has not the channels of that of {sums.path}"
+            raise ValueError(f"{new.path}: {one_line(words)}")
     for seed in sorted(new.files.keys() & sums.files.keys()):
         where = sums.files[seed]
         raise ValueError(f"{new.path}: its seed {seed} is in {where}, too: other noise is needed")

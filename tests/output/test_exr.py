@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import math
-from typing import TYPE_CHECKING
+import struct
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import OpenEXR
 import pytest
 
-from drpt.output import read, read_exr, write
+from drpt.output import read, read_exr, read_exr_layers, write
 from tests.output.pictures import METADATA, grey
 
 if TYPE_CHECKING:
@@ -124,3 +126,107 @@ def test_without_colours_is_refused(tmp_path: Path) -> None:
     OpenEXR.File({}, {"Z": np.zeros((2, 3), np.float32)}).write(str(path))
     with pytest.raises(ValueError, match="its channels are Z, not R, G and B"):
         read_exr(path)
+
+
+def file_of(channels: dict[str, Any], attributes: dict[str, Any] | None = None) -> bytes:
+    stream = io.BytesIO()
+    layout = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    OpenEXR.File({**layout, **(attributes or {})}, dict(channels)).write(stream)
+    return stream.getvalue()
+
+
+RGB = {letter: np.ones((6, 7), np.float32) for letter in "RGB"}
+FLAT = np.full((6, 7), 2, np.float32)
+
+
+def refusal(path: Path, capfd: pytest.CaptureFixture[str]) -> str:
+    """What a file is refused with; nothing else is printed, as OpenEXR does by itself."""
+    with pytest.raises((ValueError, OSError)) as error:
+        read_exr_layers(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert str(error.value).isprintable()
+    assert capfd.readouterr() == ("", "")
+    return str(error.value)
+
+
+class TestOtherPrograms:
+    @pytest.mark.parametrize(
+        "channels",
+        [
+            {"normal": FLAT},
+            {"depth": FLAT},
+            {"RGB": FLAT, "RGB.R": FLAT, "RGB.G": FLAT, "RGB.B": FLAT},
+            {"RGBA": FLAT, "A": FLAT, "Y": FLAT},
+            {"normal": FLAT, "normal.X": FLAT, "normal.Y": FLAT, "normal.Z": FLAT},
+            {"x.R": FLAT, "x.G": FLAT},
+            {".R": FLAT, "R.": FLAT, "a.b.R": FLAT},
+        ],
+        ids=" ".join,
+    )
+    def test_layers_go_through_a_file(self, channels: dict[str, Any], tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        path.write_bytes(file_of({**RGB, **channels}))
+        layers, _ = read_exr_layers(path)
+        np.testing.assert_array_equal(layers["RGB"], np.ones((6, 7, 3)))
+        write(tmp_path / "b.exr", layers.pop("RGB"), {}, layers=layers)
+        again, _ = read_exr_layers(tmp_path / "b.exr")
+        assert again.keys() == {"RGB", *layers}
+        np.testing.assert_array_equal(again["RGB"], np.ones((6, 7, 3)))
+
+    @pytest.mark.parametrize("attribute", [(1.0, 2.0), ["a", "b"]])
+    def test_a_damaged_attribute_is_refused_with_its_file(
+        self, attribute: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        path = tmp_path / "a.exr"
+        path.write_bytes(file_of(RGB, {"drpt:spp": attribute}))
+        assert "its spp is " in refusal(path, capfd)
+
+    def test_attributes_that_are_no_text_are_refused(
+        self, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        path = tmp_path / "a.exr"
+        content = file_of(RGB, {"drpt:scene": "abcdefgh"})
+        path.write_bytes(content.replace(b"abcdefgh", b"ab\xff\xfe\x00\x1bgh"))
+        refusal(path, capfd)
+
+
+class TestDamage:
+    def test_a_file_that_ends_early_is_one_line(
+        self, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        path, whole = tmp_path / "a.exr", file_of(RGB)
+        for length in range(0, len(whole), 20):
+            path.write_bytes(whole[:length])
+            refusal(path, capfd)
+
+    @pytest.mark.parametrize(
+        ("width", "height"), [(65536, 65536), (10**5, 10**6), (7, 10**8), (2**28, 6), (2**28, 1)]
+    )
+    def test_a_size_that_the_file_cannot_hold_is_refused(
+        self, width: int, height: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        path = tmp_path / "a.exr"
+        path.write_bytes(resized(file_of(RGB), width, height))
+        assert f"{width}x{height} pixels in 3 channels" in refusal(path, capfd)
+
+    def test_a_size_that_memory_cannot_hold_is_refused(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        path = tmp_path / "a.exr"
+        path.write_bytes(file_of(RGB))
+        monkeypatch.setattr("drpt.machine.free_memory", lambda: 1000)
+        assert "its picture needs 1.512 kB of memory, and 1 kB are free" in refusal(path, capfd)
+
+    def test_a_layer_without_a_name_is_refused(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.exr"
+        with pytest.raises(ValueError, match=r"a\.exr: no EXR file can hold this picture"):
+            write(path, np.ones((6, 7, 3), np.float32), {}, layers={"": FLAT})
+        assert not path.exists()
+
+
+def resized(content: bytes, width: int, height: int) -> bytes:
+    """A file whose header tells of another size."""
+    mark = b"dataWindow\0box2i\0"
+    start = content.index(mark) + len(mark) + 4
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    return content[:start] + window + content[start + len(window) :]

@@ -62,6 +62,8 @@ def whole(metadata: Metadata, path: str | PathLike[str], name: str, low: int) ->
 def _checked(
     layer: NDArray[np.float32], path: str | PathLike[str], name: str
 ) -> NDArray[np.float64]:
+    if layer.ndim != 3:
+        raise ValueError(f"{path}: its layer {name} has one channel, and it must have three")
     wrong = ~(np.isfinite(layer) & (layer >= 0)).all(axis=2)
     if wrong.any():
         row, column = np.argwhere(wrong)[0].tolist()

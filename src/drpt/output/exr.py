@@ -1,11 +1,17 @@
-"""EXR files, and metadata as text."""
+"""EXR files."""
 
 from __future__ import annotations
 
-import json
+import os
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
+
+from drpt.files import open_regular
+from drpt.messages import one_line, shortened
+from drpt.output.exr_size import check_size
+from drpt.output.metadata import from_header
+from drpt.output.quiet import nothing_printed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -13,30 +19,21 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    Metadata = Mapping[str, str | int | float]
 
 CHANNELS = {"normal": "XYZ", "depth": "Z"}
 """Channels of layers, as other renderers name them; else R, G and B, or the layer's name alone."""
 
-_PREFIX = "drpt:"
-
-
-def to_header(metadata: Metadata) -> dict[str, str]:
-    """Return metadata as attributes of a file."""
-    return {_PREFIX + name: _to_text(value) for name, value in metadata.items()}
-
-
-def from_header(header: Mapping[str, Any]) -> dict[str, str | int | float]:
-    """Return the metadata among the attributes of a file: what `to_header` was given."""
-    return {
-        name.removeprefix(_PREFIX): _from_text(text)
-        for name, text in header.items()
-        if name.startswith(_PREFIX)
-    }
+PICTURE = "RGB"
+"""Name of the layer that is the picture itself."""
+MAX_LISTED = 100
+"""Characters of names of channels in an error."""
 
 
 def write_exr(
-    stream: BinaryIO, layers: Mapping[str, NDArray[np.float32]], header: Mapping[str, str]
+    stream: BinaryIO,
+    path: str | PathLike[str],
+    layers: Mapping[str, NDArray[np.float32]],
+    header: Mapping[str, str],
 ) -> None:
     """Write layers (height, width, 3) or (height, width); ``"RGB"`` is the picture itself.
 
@@ -48,13 +45,24 @@ def write_exr(
     layout = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
     channels: dict[str, NDArray[np.float32]] = {}
     for name, layer in layers.items():
-        if name in CHANNELS:
-            planes = layer.reshape(*layer.shape[:2], -1)
-            for index, letter in enumerate(CHANNELS[name]):
-                channels[f"{name}.{letter}"] = np.ascontiguousarray(planes[..., index], np.float32)
-        else:
-            channels[name] = np.ascontiguousarray(layer, np.float32)
-    OpenEXR.File({**layout, **header}, channels).write(stream)
+        planes = layer.reshape(*layer.shape[:2], -1)
+        for index, channel in enumerate(_channels_of(name, layer.ndim == 3)):
+            channels[channel] = np.ascontiguousarray(planes[..., index], np.float32)
+    try:
+        OpenEXR.File({**layout, **header}, channels).write(stream)
+    except (RuntimeError, ValueError) as error:
+        problem = f"no EXR file can hold this picture ({one_line(str(error))})"
+        raise ValueError(f"{path}: {problem}") from error
+
+
+def _channels_of(name: str, is_colour: bool) -> list[str]:
+    """Names of the channels of a layer."""
+    if name == PICTURE:
+        return list("RGB")
+    letters = CHANNELS.get(name, "RGB")
+    if is_colour or letters == "Z":
+        return [f"{name}.{letter}" for letter in letters]
+    return [name]
 
 
 def read_exr(
@@ -83,40 +91,50 @@ def read_exr_layers(
     The picture itself is the layer ``"RGB"``, which must be there; what is in no layer of three
     channels, such as another program's alpha, is a flat layer with the name of its channel.
     """
+    try:
+        with open_regular(path) as stream:
+            channels, header = _read_file(stream)
+        metadata = from_header(header)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+    if not {"R", "G", "B"} <= channels.keys():
+        found = shortened(", ".join(channels), MAX_LISTED)
+        raise ValueError(f"{path}: its channels are {one_line(found)}, not R, G and B")
+    for name, plane in channels.items():
+        if plane.shape != channels["R"].shape:
+            named = one_line(shortened(name, MAX_LISTED))
+            raise ValueError(f"{path}: its channel {named} has another size than the picture")
+    return _layers(channels), metadata
+
+
+def _read_file(stream: BinaryIO) -> tuple[dict[str, NDArray[np.float32]], dict[str, Any]]:
+    """Return channels and attributes of the first part of a file, after a look at its header."""
     import OpenEXR
 
-    with open(path, "rb") as stream:
-        try:
+    try:
+        with nothing_printed():
+            header = OpenEXR.File(stream, header_only=True)
+            parts = [part.header for part in header.parts]
+        check_size(parts, os.fstat(stream.fileno()).st_size)
+        stream.seek(0)
+        with nothing_printed():
             file = OpenEXR.File(stream, separate_channels=True)
-            channels, header = file.channels(), file.header()
-        except (RuntimeError, ValueError) as error:
-            raise ValueError(f"{path}: this is not a readable EXR file ({error})") from error
-    if not {"R", "G", "B"} <= channels.keys():
-        raise ValueError(f"{path}: its channels are {', '.join(channels)}, not R, G and B")
-    planes = {name: channel.pixels.astype(np.float32) for name, channel in channels.items()}
-    return _layers(planes), from_header(header)
+            channels = file.channels()
+            planes = {name: channels[name].pixels for name in channels}
+        flat = {name: plane.astype(np.float32) for name, plane in planes.items()}
+    except (RuntimeError, TypeError, UnicodeDecodeError) as error:
+        raise ValueError(f"this is not a readable EXR file ({one_line(str(error))})") from error
+    return flat, parts[0]
 
 
 def _layers(planes: dict[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
-    """Take channels together that make up a layer."""
+    """Take channels together that make up a layer; one that is named as a layer is left out."""
     layers: dict[str, NDArray[np.float32]] = {}
-    for prefix in dict.fromkeys(["", *(name.rpartition(".")[0] for name in planes)]):
-        letters = CHANNELS.get(prefix, "RGB")
-        members = [f"{prefix}.{letter}" if prefix else letter for letter in letters]
+    prefixes = dict.fromkeys(name.rpartition(".")[0] for name in planes)
+    for prefix in sorted(prefixes.keys() - {PICTURE}):
+        name = prefix or PICTURE
+        members = _channels_of(name, is_colour=True)
         if planes.keys() >= set(members):
             layer = np.stack([planes.pop(member) for member in members], axis=-1)
-            layers[prefix or "RGB"] = layer[..., 0] if len(letters) == 1 else layer
-    return {**layers, **planes}
-
-
-def _to_text(value: str | int | float) -> str:
-    """Return a text from which `_from_text` makes an equal value of the same type."""
-    plain = isinstance(value, str) and value.isascii() and _from_text(value) == value
-    return str(value) if plain else json.dumps(value)
-
-
-def _from_text(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
+            layers[name] = layer[..., 0] if len(members) == 1 else layer
+    return {**planes, **layers}

@@ -10,14 +10,15 @@ import numpy as np
 
 from drpt.files import check_file, replacing
 from drpt.output.display import check_look, to_display
-from drpt.output.exr import read_exr_layers, to_header, write_exr
+from drpt.output.exr import read_exr_layers, write_exr
+from drpt.output.metadata import to_header
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from drpt.output.exr import Metadata
+    from drpt.output.metadata import Metadata
 
 SUFFIXES = (".exr", ".png", ".npy")
 READABLE = (".exr", ".npy")
@@ -89,7 +90,7 @@ def write(
     with replacing(Path(path)) as stream:
         match Path(path).suffix.lower():
             case ".exr":
-                write_exr(stream, {"RGB": image, **(layers or {})}, header)
+                write_exr(stream, path, {"RGB": image, **(layers or {})}, header)
             case ".png":
                 write_png(stream, image, header, exposure=exposure, curve=curve)
             case _:
