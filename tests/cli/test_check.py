@@ -87,10 +87,31 @@ class TestCheck:
         """The reference is brighter by a tenth; it tells its own bounces and size."""
         scene = drpt.load_scene("good.toml")
         picture = drpt.render(scene, 4096, 1)
-        output.write("a.exr", 1.1 * picture.image, picture.metadata)
+        layers = {"standard_error": 1.1 * picture.standard_error}
+        output.write("a.exr", 1.1 * picture.image, picture.metadata, layers=layers)
         assert cli.main(["check", "good.toml", "--against", "a.exr", "--spp", "65536"]) == 1
         printed, _ = capsys.readouterr()
         assert "reference: a.exr, 8x6, 1 bounce" in printed
-        assert "mis, sobol, 65536 spp: FAIL" in printed
+        assert "mis, sobol, 65536 spp: differs" in printed
         assert "good-check/mis-1-p-value.png" in printed
         assert Path("good-check/mis-1-difference.png").is_file()
+
+    @pytest.mark.parametrize(("flags", "status"), [([], 0), (["--strict"], 1)])
+    def test_what_cannot_be_told_fails_if_it_must_be(
+        self, flags: list[str], status: int, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        drpt.render(drpt.load_scene("good.toml"), 64, 1, error=False).save("a.exr")
+        command = ["check", "good.toml", "--against", "a.exr", "--spp", "64"]
+        assert cli.main([*command, *flags]) == status
+        assert "mis, sobol, 64 spp: cannot tell" in capsys.readouterr()[0]
+        assert files() == ["a.exr", "good.toml"]
+
+    def test_a_written_reference_is_good_for_the_next_check(
+        self, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert cli.main(["check", "good.toml", "-o", "maps", *CHECK_FLAGS]) == 0
+        reference = "maps/mis-1-reference.exr"
+        assert cli.main(["check", "good.toml", "--against", reference, "--spp", "64"]) == 0
+        printed, complaint = capsys.readouterr()
+        assert f"reference: {reference}, 16x12, 1 bounce\n\n" in printed
+        assert complaint == ""

@@ -10,7 +10,6 @@ from drpt.cli.parser import add_sampling, add_scene, add_size, add_transport
 from drpt.cli.status import FAILED, bad_input
 from drpt.crosscheck.check import Verdict, check
 from drpt.crosscheck.estimate import PASSES, check_spp
-from drpt.crosscheck.maps import save_maps
 from drpt.crosscheck.references import (
     BOUNCES,
     MITSUBA,
@@ -48,15 +47,21 @@ and blocks of pixels of all sizes. Each of the two tests fails by chance once in
   drpt check my.toml --width 128 --height 128 --spp 4096 -o maps
   drpt check cornell-box --mode implicit --against reference/cornell-box-3.exr
 
-exit status: 0; 1 if a picture differs or the run failed; 2 for bad input; 130 after Ctrl-C""",
+exit status: 0; 1 if a picture differs, with --strict also if a check cannot tell, or the run
+failed; 2 for bad input; 130 after Ctrl-C""",
     )
     add_scene(parser)
     parser.add_argument(
         "--against",
         metavar="REF",
         default=MITSUBA.lower(),
-        help="mitsuba, or an .exr of the same view; its layer 'variance' tells its noise "
-        "(default: %(default)s)",
+        help="mitsuba, or an .exr of the same view whose layer 'standard_error' or 'variance' "
+        "tells its noise (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="end with status 1 also where a check cannot tell",
     )
     parser.add_argument(
         "-o",
@@ -114,17 +119,17 @@ def _stored(args: argparse.Namespace, scene: Scene) -> Reference:
 
 
 def _checked(args: argparse.Namespace, reference: Reference, mode: str, folder: Path) -> bool:
-    """Check one mode, print the report and write the maps; return whether nothing differs."""
+    """Check one mode, print the report and write the maps; return whether the verdict will do."""
     with _pass_bar(mode) as on_pass:
         report = check(
             reference, mode, args.spp, sampler=args.sampler, seed=args.seed, on_pass=on_pass
         )
     print(f"\n{report}", flush=True)
-    passed = report.verdict != Verdict.FAIL
-    if args.output or not passed:
-        prefix = f"{report.mode}-{reference.bounces}-"
-        print("  maps", *save_maps(report.comparison, folder, prefix), sep="\n    ", flush=True)
-    return passed
+    if args.output or report.verdict == Verdict.DIFFERS:
+        print("  maps", *report.save(folder), sep="\n    ", flush=True)
+    return report.verdict == Verdict.AGREES or (
+        report.verdict == Verdict.CANNOT_TELL and not args.strict
+    )
 
 
 @contextmanager

@@ -12,29 +12,41 @@ import numpy as np
 from drpt.crosscheck.compare import Comparison, compare
 from drpt.crosscheck.estimate import measure
 from drpt.crosscheck.flip import has_flip, mean_flip
+from drpt.crosscheck.maps import save_maps
 from drpt.crosscheck.references import SPP, Reference
 from drpt.immutable import immutable
 from drpt.render import Mode
 from drpt.scene import Phong, Scene
+from drpt.scene.saving import to_toml
 
 if TYPE_CHECKING:
+    from os import PathLike
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from drpt.crosscheck.estimate import OnPass
+    from drpt.crosscheck.stored import Metadata
 
 TELLING = 0.01
-"""Difference of the means, relative, that a check must be able to detect to say "pass"."""
+"""Difference of the means, relative, that a check must be able to detect to say "agrees"."""
 MIN_EVENTS = 1000
 """Samples of the rarest kind that matters: fewer do not tell how much they vary."""
 RARE = "the samples that meet sharp lobes are too few to tell how much they vary"
+UNKNOWN = "the reference does not tell its noise, so no difference can be told from it"
 
 
 class Verdict(StrEnum):
     """What a check says of a picture."""
 
-    PASS = "pass"
-    FAIL = "FAIL"
-    OPEN = "cannot tell"
+    AGREES = "agrees"
+    DIFFERS = "differs"
+    CANNOT_TELL = "cannot tell"
+
+    PASS = AGREES
+    """An alias, as are the next two."""
+    FAIL = DIFFERS
+    OPEN = CANNOT_TELL
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +75,10 @@ class Report:
     def verdict(self) -> Verdict:
         """Whether the picture has the reference's expectation, as far as can be told."""
         if not self.comparison.passed:
-            return Verdict.FAIL
+            return Verdict.DIFFERS
         test = self.comparison.of_image
         telling = test.resolved & (test.detectable <= TELLING * np.abs(test.reference))
-        return Verdict.PASS if telling.all() else Verdict.OPEN
+        return Verdict.AGREES if telling.all() else Verdict.CANNOT_TELL
 
     def __str__(self) -> str:
         lines = [self._row("mean", "drpt", "reference", "difference", "std. error", "detects")]
@@ -75,22 +87,43 @@ class Report:
         for channel, (ours, theirs, *rest) in zip("RGB", zip(*columns, strict=True), strict=True):
             shares = (f"{_percent(value, theirs)} %" for value in rest)
             lines.append(self._row(channel, f"{ours:.6g}", f"{theirs:.6g}", *shares))
-        lines.append(f"  means    p = {test.p_value:.2g}{self._left_out()}")
+        lines.append(f"  means    {self._means()}")
         lines.append(f"  blocks   {self._blocks()}")
         if self.flip is not None:
             lines.append(f"  FLIP     {self.flip:.4f}")
         if not test.resolved:
-            lines.append(f"  {RARE}")
+            lines.append(f"  {RARE if self.reference.estimate.is_noise_known else UNKNOWN}")
         spp = self.comparison.image.spp
         return "\n".join([f"{self.mode}, {self.sampler}, {spp} spp: {self.verdict}", *lines])
+
+    def save(self, folder: str | PathLike[str]) -> list[Path]:
+        """Write both pictures and maps of their differences into a folder; return their paths.
+
+        See :func:`drpt.crosscheck.maps.save_maps`. Each picture tells its noise, its bounces and
+        its scene, as a reference must.
+        """
+        scene = to_toml(self.reference.scene)
+        common: Metadata = {"bounces": self.reference.bounces, "scene": scene}
+        renderer = self.reference.renderer
+        return save_maps(
+            self.comparison,
+            folder,
+            f"{self.mode}-{self.reference.bounces}-",
+            image_metadata={**common, "mode": str(self.mode), "sampler": self.sampler},
+            reference_metadata={**common, **({"renderer": renderer} if renderer else {})},
+        )
 
     @staticmethod
     def _row(name: str, *cells: str) -> str:
         return f"  {name:8}" + "".join(f"{cell:>13}" for cell in cells)
 
-    def _left_out(self) -> str:
+    def _means(self) -> str:
+        p_value = self.comparison.of_image.p_value
+        if np.isnan(p_value):
+            return "not compared"
         edges = self.comparison.of_blocks.p_map.size - self.comparison.of_image.pixels
-        return f", without {edges} pixels at the edges of lights" if edges else ""
+        left_out = f", without {edges} pixels at the edges of lights" if edges else ""
+        return f"p = {p_value:.2g}{left_out}"
 
     def _blocks(self) -> str:
         test = self.comparison.of_blocks
@@ -171,4 +204,4 @@ def light_edges(scene: Scene, spp: int) -> NDArray[np.bool_]:
 
 
 def _percent(value: float, whole: float) -> str:
-    return f"{100 * value / whole:.4f}" if whole else "-"
+    return f"{100 * value / whole:.4f}" if whole and not np.isnan(value) else "-"

@@ -56,13 +56,15 @@ class ImageTest(Immutable):
     pixels
         How many pixels were counted.
     resolved
-        Whether they have samples enough to tell their own errors.
+        Whether the errors of both are known: the reference tells its own, and there are samples
+        enough to tell those of the image.
     mean, reference
         Their mean in both images.
     standard_error
         Of their difference.
     p_value
-        Probability of such a difference, or a larger one, in one of the channels by chance.
+        Probability of such a difference, or a larger one, in one of the channels by chance; not a
+        number if the error of the reference is unknown.
     detectable
         Smallest difference that would have been detected, with the probability `POWER`.
     """
@@ -177,7 +179,7 @@ def compare(
     image
         What is tested.
     reference
-        What it should be; taken as exact if it has no passes.
+        What it should be. Where its variance is not a number, nothing is compared.
     edges
         Pixels (height, width) to leave out of the images' means, because their noise drowns the
         rest, unless that is black; by default none. Every pixel counts in the blocks.
@@ -239,7 +241,8 @@ class _Welch:
         error = _standard_error(image, reference)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = np.where(difference <= 0, 0, difference / error)
-        return np.where(np.isnan(t), 0.0, 2 * stats.t.sf(t, self.degrees_of_freedom))
+        p_value = 2 * stats.t.sf(t, self.degrees_of_freedom)
+        return np.where(np.isfinite(image.mean + reference.mean), p_value, 0.0)
 
     def detectable(self, image: Value, reference: Value, comparisons: int) -> Floats:
         """Differences that n comparisons detect with the probability `POWER`."""
@@ -263,7 +266,8 @@ def _test_image(test: _Welch, kept: NDArray[np.bool_]) -> ImageTest:
     detectable = test.detectable(image, reference, channels)
     error = _standard_error(image, reference)
     pixels = int(kept.sum())
-    resolved = bool((test.has_samples(pixels) | ~np.isfinite(image.mean)).any())
+    known = ~np.isnan(reference.variance) & test.has_samples(pixels)
+    resolved = bool((known | ~np.isfinite(image.mean)).any())
     return ImageTest(pixels, resolved, image.mean, reference.mean, error, p_value, detectable)
 
 
@@ -279,7 +283,8 @@ def _test_blocks(test: _Welch, kept: NDArray[np.bool_]) -> BlockTest:
     pixels = _cautious(*test.pair, kept)
     for side in _sides(height, width):
         image, reference = (_blocks(values, side) for values in pixels)
-        resolved = _resolved(image) & (_resolved(reference) | (reference.mean == 0))
+        black = (reference.mean == 0) & ~np.isnan(reference.variance)
+        resolved = _resolved(image) & (_resolved(reference) | black)
         resolved &= test.has_samples(side**2) | ~np.isfinite(image.mean)
         p_value = np.where(resolved, test.p_value(image, reference), 1.0)
         levels.append(_Level(side, image, reference, resolved, p_value))

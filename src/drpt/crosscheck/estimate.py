@@ -42,15 +42,21 @@ class Estimate(Immutable):
         Linear radiance, float64 (height, width, 3), row 0 at the top.
     variance
         Variance of that mean, estimated from the passes; float64 (height, width, 3). Pixels are
-        independent of each other.
+        independent of each other. Not a number where it is unknown.
     passes, spp
-        How many passes, and how many samples each pixel has got in all of them.
+        How many passes, and how many samples each pixel has got in all of them. No passes and
+        variance 0 stand for an exact image.
     """
 
     mean: NDArray[np.float64]
     variance: NDArray[np.float64]
     passes: int
     spp: int
+
+    @property
+    def is_noise_known(self) -> bool:
+        """Whether every variance is a number."""
+        return not np.isnan(self.variance).any()
 
 
 def measure(

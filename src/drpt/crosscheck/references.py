@@ -28,6 +28,10 @@ OFFSET = (
     "coordinates: Mitsuba's rays start up to {} of the scene's size off their surfaces, so its "
     "picture may be anything; scale the scene to 1 or more, and move it to the origin"
 )
+UNKNOWN = (
+    "{} tells nothing of its noise, so whether a picture agrees with it cannot be told: it has no "
+    "layer standard_error or variance"
+)
 NORMALS = (
     "interpolated normals: Mitsuba looks at shading normals alone, drpt at both, so their pictures "
     "differ where the two disagree on the side of a direction"
@@ -52,6 +56,8 @@ class Reference:
         Its own relative error that is known; infinite where it may be anything.
     remarks
         Sentences on what it is not good for.
+    renderer
+        What rendered it, if that is known.
     """
 
     scene: Scene
@@ -60,6 +66,7 @@ class Reference:
     source: str
     tolerance: float
     remarks: tuple[str, ...]
+    renderer: str | None = None
 
     def __str__(self) -> str:
         height, width, _ = self.estimate.mean.shape
@@ -79,15 +86,17 @@ def render_reference(
     Rendering(scene, check_spp(spp), bounces, seed=seed)  # refuses what is not allowed
     estimate = reference(scene, spp, bounces, seed, on_pass=on_pass)
     source = f"{MITSUBA} {version('mitsuba')} ({VARIANT}), {spp} spp"
-    return Reference(scene, bounces, estimate, source, tolerance(scene), _remarks(scene))
+    remarks = _remarks(scene)
+    return Reference(scene, bounces, estimate, source, tolerance(scene), remarks, MITSUBA)
 
 
 def stored_reference(
     scene: Scene, path: str | PathLike[str], bounces: int | None = None
 ) -> Reference:
-    """Read a reference from an EXR file, with the variances that are a layer of it if there are.
+    """Read a reference from an EXR file, with the noise that a layer of it tells.
 
-    Without that layer it is taken as exact. The scene is rendered in its size.
+    See :func:`drpt.crosscheck.stored.load_estimate`. Without such a layer no check can tell whether
+    a picture agrees with it. The scene is rendered in its size.
 
     Parameters
     ----------
@@ -113,13 +122,13 @@ def stored_reference(
     bounces = BOUNCES if bounces is None else bounces
     Rendering(scene, bounces=bounces)  # refuses what is not allowed
     scene = _resized(scene, estimate, path)
-    remarks = () if estimate.passes else (f"{path} tells no variances: it is taken as exact",)
+    remarks = () if estimate.is_noise_known else (UNKNOWN.format(path),)
     if metadata.get("scene") not in (None, to_toml(scene)):
         remarks = (*remarks, f"{path} was made of a scene that is not quite this one")
     if metadata.get("renderer") != MITSUBA:
         return Reference(scene, bounces, estimate, str(path), 0.0, remarks)
     remarks = (*remarks, *_remarks(scene))
-    return Reference(scene, bounces, estimate, str(path), tolerance(scene), remarks)
+    return Reference(scene, bounces, estimate, str(path), tolerance(scene), remarks, MITSUBA)
 
 
 def _resized(scene: Scene, estimate: Estimate, path: str | PathLike[str]) -> Scene:

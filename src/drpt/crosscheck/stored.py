@@ -1,4 +1,4 @@
-"""Estimates in EXR files: the mean as the picture, its variance as a layer beside it."""
+"""Estimates in EXR files: the mean as the picture, its noise as a layer beside it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drpt.crosscheck.estimate import Estimate
+from drpt.crosscheck.estimate import PASSES, Estimate
 from drpt.output import read_exr_layers, write
+from drpt.result import STANDARD_ERROR
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,36 +20,59 @@ if TYPE_CHECKING:
 
 VARIANCE = "variance"
 """Name of the layer that holds the variance of the mean."""
+CALIBRATION = 1.4
+"""The variance that a picture tells of itself may be too small by this factor.
+
+See docs/explanation/error.md, where it is measured.
+"""
 
 
 def save_estimate(estimate: Estimate, path: str | PathLike[str], metadata: Metadata) -> None:
     """Write an estimate as float32 EXR, with its passes, its spp and more metadata.
 
-    Raises `ValueError` and `OSError` like :func:`drpt.output.write`, and `ValueError` where a
-    variance is too small or too large for float32.
+    Where a variance is too small or too large for float32, the layer is ``standard_error``; where
+    the noise is unknown, there is none. Raises `ValueError` and `OSError` like
+    :func:`drpt.output.write`.
     """
+    image = estimate.mean.astype(np.float32)
+    if not estimate.is_noise_known:
+        write(path, image, metadata)
+        return
+    figures = {"spp": estimate.spp, "passes": estimate.passes}
+    write(path, image, {**metadata, **figures}, layers=_noise_layer(estimate))
+
+
+def _noise_layer(estimate: Estimate) -> dict[str, NDArray[np.float32]]:
     tiny, huge = np.finfo(np.float32).tiny, np.finfo(np.float32).max
     spread = estimate.variance[estimate.variance > 0]
-    if spread.size and not tiny <= spread.min() <= spread.max() <= huge:
-        raise ValueError(f"{path}: its variances do not fit float32; scale the scene's radiance")
-    figures = {"spp": estimate.spp, "passes": estimate.passes}
-    layers = {VARIANCE: estimate.variance.astype(np.float32)}
-    write(path, estimate.mean.astype(np.float32), {**metadata, **figures}, layers=layers)
+    if not spread.size or tiny <= spread.min() <= spread.max() <= huge:
+        return {VARIANCE: estimate.variance.astype(np.float32)}
+    return {STANDARD_ERROR: np.sqrt(estimate.variance).astype(np.float32)}
 
 
 def load_estimate(path: str | PathLike[str]) -> tuple[Estimate, dict[str, str | int | float]]:
     """Read an estimate and its metadata.
 
-    A picture without a layer of variances has no passes and variance 0: it is taken as exact.
-    Raises `ValueError` and `OSError` like :func:`drpt.output.read_exr`, and `ValueError` where
-    radiance or variances are negative or not finite, or the metadata is not what it must be.
+    The noise is that of the layer ``variance``, or else ``standard_error``, which drpt gives every
+    picture. Without passes it was estimated from the samples of one, and its variance counts as
+    `CALIBRATION` times what the layer says, as sure as that of `PASSES`. Without either layer the
+    variance is not a number. Raises `ValueError` and `OSError` like :func:`drpt.output.read_exr`,
+    and `ValueError` where radiance or noise is negative or not finite, or the metadata is not what
+    it must be.
     """
     layers, metadata = read_exr_layers(path)
     mean = _checked(layers["RGB"], path, "radiance")
-    if VARIANCE not in layers:
-        return Estimate(mean, np.zeros_like(mean), 0, 0), metadata
-    passes, spp = (whole(metadata, path, name, low=2) for name in ("passes", "spp"))
-    return Estimate(mean, _checked(layers[VARIANCE], path, VARIANCE), passes, spp), metadata
+    if VARIANCE in layers:
+        variance = _checked(layers[VARIANCE], path, VARIANCE)
+    elif STANDARD_ERROR in layers:
+        variance = np.square(_checked(layers[STANDARD_ERROR], path, STANDARD_ERROR))
+    else:
+        return Estimate(mean, np.full_like(mean, np.nan), 0, 0), metadata
+    if VARIANCE in layers or "passes" in metadata:
+        passes, spp = (whole(metadata, path, name, low=2) for name in ("passes", "spp"))
+        return Estimate(mean, variance, passes, spp), metadata
+    spp = whole(metadata, path, "spp", low=2)
+    return Estimate(mean, CALIBRATION * variance, PASSES, spp), metadata
 
 
 def whole(metadata: Metadata, path: str | PathLike[str], name: str, low: int) -> int:
