@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.error import DARK, INDEPENDENT, relative_mse, squared_differences
+from drpt.convergence import INDEPENDENT
+from drpt.error import DARK, relative_mse, squared_differences
 from drpt.error import estimate as estimated
 from drpt.film import Film
 from tests.scenes import LAMP_AND_BALL, seen_by
@@ -155,7 +156,7 @@ class TestWhatIsNotNoise:
         _, errors = estimate(samples, independent=independent)
         assert not np.isfinite(errors[60, 70]).any()
         far = np.ones((SIDE, SIDE), bool)
-        far[55:66, 65:76] = False  # two windows and the neighbours that weights look at
+        far[54:67, 64:77] = False  # windows of three passes
         assert np.isfinite(errors[far]).all()
         assert errors[far] == pytest.approx(clean[far], rel=1e-9 if independent else 1e-2)
 

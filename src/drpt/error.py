@@ -19,10 +19,15 @@ of four independent replicates has 1.5 to 2 times the relMSE in the Cornell boxe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from drpt.convergence import INDEPENDENT, combined, fall, local_ratios, ratio
+from drpt.pooling import pooled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,15 +36,11 @@ if TYPE_CHECKING:
 
 DARK = 0.01
 """Added to squares of radiance, so that dark pixels do not decide about relMSE."""
-INDEPENDENT, SMOOTH = 2.0, 8.0
-"""Least and greatest ρ."""  # noqa: RUF001
-PRIOR = 64
-"""Pixels' worth of belief in independent samples, which decides in the smallest pictures."""
 AT_ONCE = 2**14
 """Pixels whose blocks and their differences stay in the cache: new memory takes longest."""
 TINY = np.finfo(np.float64).tiny
 WINDOW = 5
-"""Pixels along the sides of the squares in which variances are averaged: one has too few blocks."""
+"""Pixels along the sides of the squares in which noise is averaged, for `_weights`."""
 
 
 def relative_mse(squares: Array, image: Array) -> float:
@@ -79,7 +80,15 @@ def estimate(
 ) -> tuple[Array, float]:
     """Standard errors (height, width, 3) of an image of that shape, and its relMSE.
 
-    They are not a number if unknown.
+    They are not a number if unknown. Parameters are those of :class:`Estimate`.
+    """
+    found = Estimate(differences, image, growth, independent)
+    return found.standard_errors, found.relative_mse
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What the samples of an image tell about its error.
 
     Parameters
     ----------
@@ -92,37 +101,61 @@ def estimate(
     independent
         Whether samples are independent; else they are Sobol' points.
     """
-    if not len(differences):
-        return np.full_like(image, np.nan), np.nan
-    weights = _weights(image, _average(differences[0].astype(np.float64), WINDOW))
-    coarse, *fine = (level.astype(np.float64) * weights for level in differences)
-    ratio = INDEPENDENT if independent or not fine else _ratio(coarse, fine[0])
-    for level in fine:  # two of them for each coarse one
-        coarse = (coarse + 2 * level / ratio) / 3
-    weighted = _average(coarse, WINDOW) * (_fall(growth, ratio) / (ratio - 1))
-    return np.sqrt(weighted / weights), float(weighted.mean())
 
+    differences: NDArray[np.float32]
+    image: Array
+    growth: float
+    independent: bool
 
-def _fall(growth: float, ratio: float) -> float:
-    """Variance of the mean of a run and of what follows, over that of the mean of the run.
+    @property
+    def standard_errors(self) -> Array:
+        """Standard error of each value, (height, width, 3); not a number if unknown.
 
-    What follows is shorter than the run. The covariance of the means of two neighbouring runs is
-    v(run of both) − E[((A − B) / 2)²] = (2/ρ − 1) v(run).
-    """
-    rest = growth - 1
-    of_rest = rest**2 * rest ** -np.log2(ratio) if rest else 0.0
-    return float((1 + 2 * rest * (2 / ratio - 1) + of_rest) / growth**2)
+        Variances are averaged over pixels around that are as noisy; see :mod:`drpt.pooling`.
+        """
+        if not self._levels:
+            return np.full_like(self.image, np.nan)
+        ratios: Array | float = self._ratio
+        if not self.independent and len(self._levels) > 1:
+            coarse, fine = self._levels
+            ratios = local_ratios(coarse, fine, self._ratio)[..., None]
+        return np.sqrt(pooled(self._variances(ratios), self.image))
 
+    @cached_property
+    def relative_squares(self) -> Array:
+        """Variance of each value by its square, (height, width, 3), whose mean is the relMSE.
 
-def _ratio(coarse: Array, fine: Array) -> float:
-    """ρ, from the squares of differences of one size and of half of it."""
-    known = np.isfinite(coarse + fine)
-    top, below = (float(np.sum(level, where=known)) / level.size for level in (coarse, fine))
-    belief = PRIOR / coarse[..., 0].size * (top + below) / 2
-    if not top + below > 0:
-        return INDEPENDENT
-    ratio = (below + INDEPENDENT * belief) / (top + belief)
-    return float(np.clip(ratio, INDEPENDENT, SMOOTH))
+        Each tells little by itself: it is of the samples of one pixel.
+        """
+        if not self._levels:
+            return np.full_like(self.image, np.nan)
+        return self._variances(self._ratio) * self._weights
+
+    @property
+    def relative_mse(self) -> float:
+        """Estimated relMSE of the image; not a number if unknown."""
+        return float(np.mean(self.relative_squares))
+
+    @cached_property
+    def _levels(self) -> list[Array]:
+        return [level.astype(np.float64) for level in self.differences]
+
+    @cached_property
+    def _weights(self) -> Array:
+        return _weights(self.image, _average(self._levels[0], WINDOW))
+
+    @cached_property
+    def _ratio(self) -> float:
+        """ρ of the picture."""
+        if self.independent or len(self._levels) < 2:
+            return INDEPENDENT
+        return ratio(*(level * self._weights for level in self._levels))
+
+    def _variances(self, ratios: Array | float) -> Array:
+        """Variances, each unbiased but for ρ."""
+        coarse, *finer = self._levels
+        squares = combined(coarse, finer[0], ratios) if finer else coarse
+        return squares * (fall(self.growth, ratios) / (ratios - 1))
 
 
 def _weights(image: Array, noise: Array) -> Array:

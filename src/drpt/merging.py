@@ -4,7 +4,8 @@ With the samples n of a pixel in each of them, its value x and standard error s 
 
     x = Σ nᵢ xᵢ / Σ nᵢ,    s = √(Σ (nᵢ sᵢ)²) / Σ nᵢ,
 
-as other seeds are independent.
+as other seeds are independent. The relMSE is that of these standard errors, times what the relMSE of
+the pictures is over that of theirs: standard errors are smoothed, and tell it less well.
 """
 
 from __future__ import annotations
@@ -101,6 +102,8 @@ class _Sums:
     metadata: Metadata
     layers: dict[str, _Weighted]  # all but the next
     squares: Array  # Σ (nᵢ sᵢ)²; not a number unless all standard errors are known
+    told: float  # Σ nᵢ² relMSEᵢ, as the pictures tell it
+    derived: float  # the same, from their standard errors
 
     @property
     def samples(self) -> Array:
@@ -117,6 +120,8 @@ class _Sums:
             _join(self.metadata, other.metadata),
             {**self.layers, **other.layers, **added},
             self.squares + other.squares,
+            self.told + other.told,
+            self.derived + other.derived,
         )
 
     def divided(self) -> tuple[Layers, Metadata]:
@@ -127,6 +132,8 @@ class _Sums:
             errors = _Weighted(np.sqrt(self.squares), self.samples).divided()
             layers[STANDARD_ERROR] = errors
             error = relative_mse(np.square(errors), layers["RGB"])
+            if self.derived > 0:
+                error *= self.told / self.derived
             metadata |= {"error": error} if np.isfinite(error) else {}
         return {name: layer.astype(np.float32) for name, layer in layers.items()}, metadata
 
@@ -139,12 +146,17 @@ def _read(path: Path) -> _Sums:
     samples = layers.pop(SAMPLES, np.full(image.shape[:2], metadata["spp"], np.float64))
     errors = layers.pop(STANDARD_ERROR, np.full_like(image, np.nan))
     _check_layers(path, samples, errors, image)
+    derived = relative_mse(np.square(errors), image)
+    told = metadata.get("error")
+    weight = float(samples.mean()) ** 2
     return _Sums(
         path,
         dict.fromkeys(seeds(metadata), path),
         metadata,
         {n: _Weighted(layer * _like(samples, layer), samples) for n, layer in layers.items()},
         np.square(errors * _like(samples, errors)),
+        weight * (told if isinstance(told, float) else derived),
+        weight * derived,
     )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drpt.distribution import versions
-from drpt.error import estimate
+from drpt.error import Estimate
 from drpt.immutable import Immutable, immutable
 from drpt.notebook import figure
 from drpt.output import write
@@ -86,31 +86,25 @@ class Result(Immutable):
         """Paths traced: width × height × spp."""
         return int(self.image.size // 3 * self.spp)
 
-    @property
+    @cached_property
     def standard_error(self) -> NDArray[np.float32]:
         """Standard error of every value of the image, float32 (height, width, 3).
 
         Not a number with a single sample, where the error was turned off, and in pictures that
         an exception left amid a pass. See :mod:`drpt.error`.
         """
-        return self._estimate[0]
-
-    @property
-    def error(self) -> float:
-        """Estimated relMSE of the image, mean (x − truth)² / (truth² + 0.01)."""
-        return self._estimate[1]
+        return immutable(self._estimate.standard_errors.astype(np.float32))
 
     @cached_property
-    def _estimate(self) -> tuple[NDArray[np.float32], float]:
-        if self._differences is None:
-            return immutable(np.full_like(self.image, np.nan)), np.nan
-        errors, relative_mse = estimate(
-            self._differences,
-            self.image.astype(np.float64),
-            self._growth,
-            independent=self.sampler == "independent",
-        )
-        return immutable(errors.astype(np.float32)), relative_mse
+    def error(self) -> float:
+        """Estimated relMSE of the image, mean (x − truth)² / (truth² + 0.01)."""
+        return self._estimate.relative_mse
+
+    @cached_property
+    def _estimate(self) -> Estimate:
+        differences = self.image[None][:0] if self._differences is None else self._differences
+        image = self.image.astype(np.float64)
+        return Estimate(differences, image, self._growth, self.sampler == "independent")
 
     def denoise(self) -> Result:
         """Denoise the image by Open Image Denoise, guided by albedo and normal if it has them.

@@ -1,0 +1,109 @@
+"""How fast the variance of a mean falls with its samples: by the factor ρ for twice as many."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+INDEPENDENT, SMOOTH = 2.0, 8.0
+"""Least and greatest ρ."""  # noqa: RUF001
+LEAST = 1.8
+"""Least ρ of a few pixels: less than `INDEPENDENT`, as estimates scatter to both sides of it."""  # noqa: RUF001
+PRIOR = 64
+"""Pixels' worth of belief in independent samples, which decides in the smallest pictures."""
+LEVEL_PRIOR = 1
+"""Pixels' worth of belief that samples of one level of noise are independent: rare ones are."""
+TILE_PRIOR = 6
+"""Pixels' worth of belief that one tile has the ratio of all pixels of the level."""
+TILE = 8
+"""Pixels along the sides of a tile."""
+
+
+def ratio(coarse: Array, fine: Array) -> float:
+    """ρ of a picture, from the squares of differences of one size and of half of it."""
+    known = np.isfinite(coarse + fine)
+    top, below = (float(np.sum(level, where=known)) / level.size for level in (coarse, fine))
+    belief = PRIOR / coarse[..., 0].size * (top + below) / 2
+    if not top + below > 0:
+        return INDEPENDENT
+    found = (below + INDEPENDENT * belief) / (top + belief)
+    return float(np.clip(found, INDEPENDENT, SMOOTH))
+
+
+def local_ratios(coarse: Array, fine: Array, whole: float) -> Array:
+    """ρ of each pixel (height, width), where ``whole`` is that of the picture.
+
+    The edges of lights have another ρ than what they light, and much more noise. So ρ is estimated
+    for the pixels of each level of noise, a power of ten, and of each tile of the picture. Between
+    levels it is interpolated linearly.
+    """
+    coarse, fine = coarse.sum(axis=2), fine.sum(axis=2)
+    noise = combined(coarse, fine, whole)
+    known = np.isfinite(noise) & (noise > 0)
+    if not known.any():
+        return np.full(noise.shape, whole)
+    noise[~known] = np.inf  # so that it counts for nothing
+    level = np.log10(noise, where=known, out=np.zeros_like(noise))
+    tiles = _Tiles(level)
+    top, below = (
+        tiles.sums(np.divide(values, noise, where=known, out=np.zeros_like(noise)))
+        for values in (coarse, fine)
+    )
+    of_level = _towards(INDEPENDENT, top.sum(axis=0), below.sum(axis=0), LEVEL_PRIOR)
+    of_level = np.maximum(of_level, INDEPENDENT)
+    of_tile = _towards(of_level, top, below, TILE_PRIOR)
+    return tiles.at_pixels(np.clip(of_tile, LEAST, SMOOTH))
+
+
+def combined(coarse: Array, fine: Array, ratio: Array | float) -> Array:
+    """Squares of differences of the larger size, from both: there are two smaller ones for each."""
+    return (coarse + 2 * fine / ratio) / 3
+
+
+def fall(growth: float, ratio: Array | float) -> Array:
+    """Variance of the mean of a run and of what follows, over that of the mean of the run.
+
+    What follows is shorter than the run. The covariance of the means of two neighbouring runs is
+    v(run of both) − E[((A − B) / 2)²] = (2/ρ − 1) v(run).
+    """
+    rest, ratio = growth - 1, np.asarray(ratio)
+    of_rest = rest**2 * rest ** -np.log2(ratio) if rest else np.zeros_like(ratio)
+    return np.asarray((1 + 2 * rest * (2 / ratio - 1) + of_rest) / growth**2)
+
+
+def _towards(prior: Array | float, top: Array, below: Array, pixels: float) -> Array:
+    """The ratio of sums of relative squares, with a belief of some pixels' worth in another."""
+    return (below + pixels * prior) / (top + pixels)
+
+
+class _Tiles:
+    """Squares of pixels, each with nodes at the whole levels that pixels (height, width) have."""
+
+    def __init__(self, level: Array) -> None:
+        height, width = level.shape
+        rows, columns = (np.arange(size) // TILE for size in (height, width))
+        lower = np.floor(level)
+        self._part = level - lower
+        lower -= lower.min()
+        self._shape = (int(rows[-1] + 1) * int(columns[-1] + 1), int(lower.max()) + 2)
+        tile = rows[:, None] * int(columns[-1] + 1) + columns
+        self._lower = tile * self._shape[1] + lower.astype(np.int64)
+
+    def sums(self, values: Array) -> Array:
+        """Sums (tiles, levels) of values of pixels, each shared by the levels around its own."""
+        size, lower = self._shape[0] * self._shape[1], self._lower.ravel()
+        upper_share = (values * self._part).ravel()
+        total = np.bincount(lower, values.ravel() - upper_share, size)
+        total += np.bincount(lower + 1, upper_share, size)
+        return np.asarray(total.reshape(self._shape))
+
+    def at_pixels(self, nodes: Array) -> Array:
+        """Interpolate values (tiles, levels) between levels."""
+        lower, upper = nodes.ravel()[self._lower], nodes.ravel()[self._lower + 1]
+        return np.asarray(lower + self._part * (upper - lower))

@@ -1,0 +1,56 @@
+"""How fast variance falls, in the picture and in its parts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drpt.convergence import INDEPENDENT, combined, fall, local_ratios, ratio
+
+SHAPE = 64, 64, 3
+# A sum over 2048 pixels, with one and two degrees of freedom each, has a ratio within 4 %; twice.
+SCATTER = 0.08
+
+
+def squares(ratios: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of differences of runs and of their halves (height, width, 3), for ρ of pixels."""
+    rng = np.random.default_rng(0)
+    coarse = scale * rng.chisquare(1, SHAPE)
+    return coarse, scale * ratios * rng.chisquare(2, SHAPE) / 2
+
+
+def test_the_ratio_of_a_picture() -> None:
+    for true in (2.0, 2.8, 6.0):
+        assert ratio(*squares(np.full(SHAPE, true), np.ones(SHAPE))) == pytest.approx(
+            true, rel=0.05
+        )
+
+
+def test_places_of_one_noise_have_their_own_ratios() -> None:
+    true = np.where(np.arange(64) < 32, 2.2, 4.0)[None, :, None] * np.ones(SHAPE)
+    found = local_ratios(*squares(true, np.ones(SHAPE)), 3.0)
+    assert found[:, :32].mean() == pytest.approx(2.2, rel=2 * SCATTER)  # in steps of tiles
+    assert found[:, 32:].mean() == pytest.approx(4.0, rel=2 * SCATTER)
+
+
+def test_levels_of_noise_have_their_own_ratios() -> None:
+    """Every eighth pixel has 10⁴ times the noise, as the edges of lights have."""
+    loud = (np.arange(64) % 8 == 0)[None, :, None] & np.ones(SHAPE, bool)
+    found = local_ratios(*squares(np.where(loud, 4.0, 2.2), np.where(loud, 1e4, 1.0)), 2.5)
+    assert found[loud[..., 0]].mean() == pytest.approx(4.0, rel=2 * SCATTER)
+    assert found[~loud[..., 0]].mean() == pytest.approx(2.2, rel=SCATTER)
+
+
+def test_without_noise_it_is_that_of_the_picture() -> None:
+    assert (local_ratios(np.zeros(SHAPE), np.zeros(SHAPE), 3.0) == 3.0).all()
+    assert ratio(np.zeros(SHAPE), np.zeros(SHAPE)) == INDEPENDENT
+
+
+def test_both_sizes_tell_the_same() -> None:
+    coarse, fine = squares(np.full(SHAPE, 3.0), np.ones(SHAPE))
+    assert combined(coarse, fine, 3.0).mean() == pytest.approx(1, rel=SCATTER)
+
+
+@pytest.mark.parametrize(("growth", "expected"), [(1.0, 1.0), (1.5, 1 / 1.5)])
+def test_independent_samples_fall_as_their_number(growth: float, expected: float) -> None:
+    assert fall(growth, INDEPENDENT) == pytest.approx(expected)
