@@ -4,8 +4,8 @@ With the samples n of a pixel in each of them, its value x and standard error s 
 
     x = Σ nᵢ xᵢ / Σ nᵢ,    s = √(Σ (nᵢ sᵢ)²) / Σ nᵢ,
 
-as other seeds are independent. The relMSE is that of these standard errors, times what the relMSE of
-the pictures is over that of theirs: standard errors are smoothed, and tell it less well.
+as other seeds are independent. The relMSE is that of these standard errors, times what the relMSE
+of the pictures is over that of theirs: standard errors are smoothed, and tell it less well.
 """
 
 from __future__ import annotations
