@@ -1,6 +1,6 @@
 """Whether standard errors are the true ones, in lights, beside them and elsewhere.
 
-A Markdown table: ``python -m benchmarks.calibration``, an hour; with ``--seeds 64`` a quarter of it.
+A Markdown table: ``python -m benchmarks.calibration``, an hour; ``--seeds 64`` takes a quarter.
 A ratio is the mean squared standard error over the variance across the seeds, with an interval of
 95 %. Where that misses `BOUNDS`, or a value that is equal in all pictures has a standard error, the
 exit status is 1.
