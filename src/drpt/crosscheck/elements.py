@@ -6,11 +6,13 @@ import os
 import re
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from drpt.crosscheck.xml_checks import check_dict, check_xml
 from drpt.scene import SceneError, checks
 
 if TYPE_CHECKING:
@@ -95,8 +97,9 @@ class Element:
         transform = self.get("to_world", None)
         return np.eye(4) if transform is None else np.array(transform.matrix, np.float64)
 
+    @cached_property
     def children(self) -> dict[str, Any]:
-        """Return what it holds by name: elements, and Mitsuba's objects where a dict has them."""
+        """What it holds by name: elements, and Mitsuba's objects where a dict has them."""
         props, types = self.node.props, self.mi.Properties.Type
         nodes = self.state.nodes
         return {
@@ -109,7 +112,7 @@ class Element:
 
     def elements(self) -> list[Element]:
         """Return the elements that it holds; raise `SceneError` if it holds an object."""
-        children = self.children()
+        children = self.children
         for name, child in children.items():
             if not isinstance(child, Element):
                 raise self.refuse(f"{name!r} is an object of Mitsuba's; it must be a dict")
@@ -127,12 +130,12 @@ class Element:
         return next(iter(found), None)
 
     def _of(self, kind: str) -> list[Element]:
-        children = self.children().values()
+        children = self.children.values()
         return [child for child in children if isinstance(child, Element) and child.kind == kind]
 
     def allow(self, *names: str) -> None:
         """Raise `SceneError` if it has a plain property that is not one of `names`."""
-        taken = {*names, *self.children()}
+        taken = {*names, *self.children}
         unknown = [name for name in self.node.props.keys() if name not in taken]  # noqa: SIM118
         if unknown:
             known = f"; it may have {', '.join(names)}" if names else ""
@@ -165,7 +168,10 @@ def parsed(mi: Any, source: str | PathLike[str] | dict[str, Any]) -> Iterator[El
     resolver = mi.FileResolver(previous)
     mi.set_file_resolver(resolver)
     try:
-        if not isinstance(source, dict):
+        if isinstance(source, dict):
+            check_dict(source)
+        else:
+            check_xml(mi, Path(source))
             resolver.prepend(str(Path(source).parent))
         yield _root(mi, source)
     finally:

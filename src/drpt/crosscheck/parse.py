@@ -35,14 +35,21 @@ PROPERTIES = {
     "ply": FILE,
 }
 """The shapes that drpt takes, and their properties."""
+MAX_NAMED = 8
+"""Shapes that a warning names."""
 
 
 class _Loaded(NamedTuple):
-    """A shape, what Mitsuba shows of it, and its name for people."""
+    """A shape, what Mitsuba shows of it, and the element that it comes from, or its name."""
 
     shape: Shape
     surface: Surface
-    name: str
+    origin: Element | str
+
+    @property
+    def name(self) -> str:
+        """Its name for people; to find the line of an element takes a look at the whole file."""
+        return self.origin if isinstance(self.origin, str) else self.origin.name
 
     def differences(self) -> Iterator[str]:
         """Yield what is not the same in drpt."""
@@ -103,7 +110,7 @@ def from_mitsuba(source: str | PathLike[str] | dict[str, Any]) -> Scene:
 
 def _shapes(scene: Element) -> list[_Loaded]:
     loaded = []
-    for name, child in scene.children().items():
+    for name, child in scene.children.items():
         if not isinstance(child, Element):
             loaded.append(_object(scene, name, child))
         elif child.kind not in UNSEEN:
@@ -112,12 +119,15 @@ def _shapes(scene: Element) -> list[_Loaded]:
 
 
 def _warn(loaded: list[_Loaded]) -> None:
-    names = defaultdict(list)
+    different = defaultdict(list)
     for item in loaded:
         for difference in item.differences():
-            names[difference].append(item.name)
-    for difference, shapes in names.items():
-        warnings.warn(f"{', '.join(shapes)}: {difference}", stacklevel=3)
+            different[difference].append(item)
+    for difference, items in different.items():
+        names = [item.name for item in items[:MAX_NAMED]]
+        if len(items) > MAX_NAMED:
+            names.append(f"and {len(items) - MAX_NAMED} more shapes")
+        warnings.warn(f"{', '.join(names)}: {difference}", stacklevel=3)
 
 
 def _object(scene: Element, name: str, mesh: Any) -> _Loaded:
@@ -140,8 +150,8 @@ def _shape(element: Element) -> _Loaded:
         if not np.linalg.det(element.matrix()[:3, :3]):
             raise SceneError("its to_world flattens it")
         if element.type == "sphere":
-            return _Loaded(_sphere(element, shown), shown, element.name)
-        return _Loaded(Mesh(*_mesh(element), **shown.parameters()), shown, element.name)
+            return _Loaded(_sphere(element, shown), shown, element)
+        return _Loaded(Mesh(*_mesh(element), **shown.parameters()), shown, element)
 
 
 def _mesh(element: Element) -> MeshArrays:
