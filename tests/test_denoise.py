@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,6 +90,31 @@ def test_wrong_shapes_are_named(
     layers = [np.zeros(shape, np.float32) for shape in (image, albedo) if shape is not None]
     with pytest.raises(ValueError, match=rf"^{named}: shape \(.*\) is not allowed; it must be \(h"):
         denoise(*layers)
+
+
+@needs_denoiser
+@pytest.mark.parametrize("kind", [np.float64, np.float16, ">f4", list])
+def test_other_numbers_are_converted(kind: Any) -> None:
+    image = np.round(noise(), 2).astype(np.float16).astype(np.float32)
+    other = image.tolist() if kind is list else image.astype(kind)
+    assert np.array_equal(denoise(other, other, other), denoise(image, image, image))
+
+
+@needs_denoiser
+def test_layout_in_memory_makes_no_difference() -> None:
+    image = noise()
+    assert np.array_equal(denoise(np.asfortranarray(image)), denoise(image))
+
+
+def test_a_normal_wants_the_albedo() -> None:
+    with pytest.raises(ValueError, match=r"^albedo: None is not allowed; there must be one where"):
+        denoise(noise(), normal=noise())
+
+
+@pytest.mark.parametrize("wrong", ["text", [[1], [1, 2]], noise() > 1, noise() + 1j, None])
+def test_what_is_no_number_is_refused(wrong: Any) -> None:
+    with pytest.raises(ValueError, match=r"^image: .* is not allowed; it must be an array of num"):
+        denoise(wrong)
 
 
 def test_a_missing_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:

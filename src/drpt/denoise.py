@@ -12,7 +12,7 @@ from drpt.distribution import install_command
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 
 def load_denoiser() -> ModuleType:
@@ -31,9 +31,7 @@ def load_denoiser() -> ModuleType:
 
 
 def denoise(
-    image: NDArray[np.float32],
-    albedo: NDArray[np.float32] | None = None,
-    normal: NDArray[np.float32] | None = None,
+    image: ArrayLike, albedo: ArrayLike | None = None, normal: ArrayLike | None = None
 ) -> NDArray[np.float32]:
     """Return an image with less noise, guided by what the camera sees first.
 
@@ -44,26 +42,46 @@ def denoise(
     Parameters
     ----------
     image
-        Linear radiance, float32 of shape (height, width, 3). Pixels that are not finite stay as
-        they are.
+        Linear radiance of shape (height, width, 3); other numbers become float32. Pixels that are
+        not finite stay as they are.
     albedo
         From 0 to 1, of the same shape.
     normal
-        In world space, from -1 to 1, of the same shape.
+        In world space, from -1 to 1, of the same shape; Open Image Denoise takes it only together
+        with the albedo.
 
     Raises
     ------
     ValueError
-        A shape is wrong.
+        A shape is wrong, something is not a number, or there is a normal without an albedo.
     ImportError
         See :func:`load_denoiser`.
     """
-    for name, layer in {"image": image, "albedo": albedo, "normal": normal}.items():
+    picture = _floats("image", image)
+    guides = {
+        name: None if guide is None else _floats(name, guide)
+        for name, guide in (("albedo", albedo), ("normal", normal))
+    }
+    for name, layer in {"image": picture, **guides}.items():
         if layer is not None:
-            _check_shape(name, layer.shape, image.shape)
-    finite = np.isfinite(image).all(axis=-1, keepdims=True)
-    clean = load_denoiser().denoise(np.where(finite, image, 0), albedo, normal, hdr=True)
-    return np.where(finite, clean, image)
+            _check_shape(name, layer.shape, picture.shape)
+    if albedo is None and normal is not None:
+        raise ValueError("albedo: None is not allowed; there must be one where there is a normal")
+    finite = np.isfinite(picture).all(axis=-1, keepdims=True)
+    clean = load_denoiser().denoise(np.where(finite, picture, 0), *guides.values(), hdr=True)
+    return np.where(finite, clean, picture)
+
+
+def _floats(name: str, layer: ArrayLike) -> NDArray[np.float32]:
+    """Return a layer as float32, in rows; larger numbers become infinite."""
+    try:
+        values = np.asarray(layer)
+    except ValueError:  # rows of different lengths
+        values = np.array(None)
+    if values.dtype.kind not in "fiu":
+        raise ValueError(f"{name}: {values.dtype} is not allowed; it must be an array of numbers")
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(values, np.float32)
 
 
 def _check_shape(name: str, shape: tuple[int, ...], whole: tuple[int, ...]) -> None:

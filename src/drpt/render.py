@@ -479,10 +479,13 @@ def explain(scene: Scene, bounces: int = 3, mode: str = Mode.MIS) -> Explanation
     Raises `ValueError` like :func:`render`.
     """
     rendering = Rendering(scene, bounces=bounces, mode=mode)
-    what = rendering.launcher.primitives, bounces, Mode(rendering.settings.mode)
+    with backend.interrupts_put_off():
+        launcher = rendering.launcher
+        operations = launcher.operations()
+    what = launcher.primitives, bounces, Mode(rendering.settings.mode)
     facts = {**feature_facts(*what), **layout_facts(*what)}
     return Explanation(
         features={name: fact.holds for name, fact in facts.items()},
         reasons={name: fact.reason for name, fact in facts.items()},
-        operations=rendering.launcher.operations(),
+        operations=operations,
     )

@@ -98,3 +98,41 @@ def test_every_command_has_examples_and_tells_its_statuses(
     assert f"drpt{'-' if name == 'render' else ' '}{name}" in examples
     assert "exit status: 0" in printed
     assert "2 for bad input" in printed
+
+
+NAMES = {"letters": "bild-ä-日本", "bytes": os.fsdecode(b"byte-\xff\xfe")}
+ENCODINGS = {
+    "C": {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    "ascii": {"PYTHONIOENCODING": "ascii"},
+    "UTF-8": {"LC_ALL": "C.UTF-8"},
+}
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS.values(), ids=ENCODINGS)
+@pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
+def test_names_that_a_terminal_cannot_encode_are_escaped(
+    name: str, encoding: dict[str, str]
+) -> None:
+    script = """
+import sys
+from drpt.cli import main
+_, name = sys.argv
+statuses = [
+    main(["render", "good.toml", "--spp", "1", "-o", f"{name}.exr", "-o", f"{name}.png"]),
+    main(["convert", f"{name}.exr", f"{name}.npy"]),
+    main(["compare", f"{name}.exr", f"{name}.npy"]),
+]
+try:
+    main(["render", f"{name}.toml"])
+except SystemExit as leave:
+    statuses.append(leave.code)
+print(*statuses)
+"""
+    command = [sys.executable, "-c", script, name]
+    done = subprocess.run(command, env={**os.environ, **encoding}, capture_output=True, check=True)
+    assert done.stdout.splitlines()[-1] == b"0 0 0 2"
+    assert done.stderr.count(b"\n") == 1
+    assert done.stderr.endswith(b".toml: there is no such file\n")
+    made = {os.fsencode(path.name) for path in Path().iterdir()}
+    stem = os.fsencode(name)
+    assert made == {b"good.toml", stem + b".exr", stem + b".png", stem + b".npy"}

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from drpt.cli.interrupts import SIGNALS, interrupts_noted
+from drpt.cli.interrupts import SIGNALS, interrupts_noted, interrupts_raised
 from drpt.kernel.backend import interrupts_put_off
 from drpt.output import read_exr
 from tests.cli.running import files
@@ -30,6 +30,14 @@ FOREVER = ["--spp", "1000000000"]
 # Seconds after which a program that was told to end hangs.
 PATIENCE = 60
 ROUNDS = 8
+# Runs `python -m drpt`, once somebody knows that its first line comes next.
+MARKED = """
+import runpy, signal, sys
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+print(flush=True)
+sys.argv[0] = "drpt"
+runpy.run_module("drpt", run_name="__main__")
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -99,6 +107,80 @@ class TestInterruptsNoted:
         finally:
             signal.signal(signal.SIGINT, before)
         assert request.signal is None
+
+
+class TestInterruptsRaised:
+    def test_the_first_raises_and_the_next_does_what_it_did(self) -> None:
+        heard = []
+        before = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
+        try:
+            with interrupts_raised():
+                with pytest.raises(KeyboardInterrupt):
+                    signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            signal.signal(signal.SIGINT, before)
+        assert heard == [signal.SIGINT] * 2
+
+    def test_what_was_ignored_stays_so(self) -> None:
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            with interrupts_raised():
+                signal.raise_signal(signal.SIGINT)
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    def test_an_import_that_takes_any_exception_does_not_go_on(self) -> None:
+        Path("careless.py").write_text(
+            "import signal\n"
+            "try:\n    signal.raise_signal(signal.SIGINT)\n"
+            "except BaseException:\n    print('lost')\n"
+        )
+        code = (
+            "from drpt.cli.interrupts import interrupts_raised\n"
+            "with interrupts_raised():\n    import careless\n"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+        assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, b"", b"")
+
+
+@pytest.mark.parametrize("program", [["-m", "drpt"], [str(Path(sys.executable).with_name("drpt"))]])
+def test_ctrl_c_ends_the_program_from_its_first_line_on(program: list[str]) -> None:
+    """Interrupts the import of each module by a handler that the first line has to replace."""
+    Path("sitecustomize.py").write_text(
+        "import sys, signal\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'drpt.render':\n            signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": "."}
+    command = [sys.executable, *program, "scenes"]
+    done = subprocess.run(command, env=environment, capture_output=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, b"", b"")
+
+
+def test_a_program_that_uses_drpt_keeps_its_ctrl_c() -> None:
+    code = "import signal, drpt; print(signal.getsignal(2) is signal.default_int_handler)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert done.stdout == b"True\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [["explain", "good.toml"], ["render", "good.toml"], ["scenes"]])
+def test_ctrl_c_at_any_moment_ends_a_command(command: list[str]) -> None:
+    for moment in range(6):
+        with subprocess.Popen(
+            [sys.executable, "-c", MARKED, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        ) as process:
+            assert process.stdout is not None
+            process.stdout.readline()  # Python itself has begun
+            time.sleep(moment * 0.1)
+            process.send_signal(signal.SIGINT)
+            _, complaint = process.communicate(timeout=PATIENCE)
+        assert process.returncode in (0, 130, -signal.SIGINT)
+        assert b"Traceback" not in complaint
 
 
 def test_sigterm_ends_a_program_with_a_picture() -> None:

@@ -22,8 +22,9 @@ from drpt.cli import (
     scenes,
     view,
 )
+from drpt.cli.interrupts import interrupts_raised
 from drpt.cli.parser import Parser, add_version
-from drpt.cli.status import FAILED, INTERRUPTED, drop_stdout, say
+from drpt.cli.status import FAILED, INTERRUPTED, drop_stdout, print_anything, say
 from drpt.kernel import backend
 
 if TYPE_CHECKING:
@@ -56,10 +57,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     program, unread = "drpt", 0
     try:
-        args = _parse(argv)
-        program, unread = args.parser.prog, getattr(args, "unread", 0)
-        status: int = args.run(args)
-        print(end="", flush=True)
+        with interrupts_raised():
+            print_anything()
+            args = _parse(argv)
+            program, unread = args.parser.prog, getattr(args, "unread", 0)
+            status: int = args.run(args)
+            print(end="", flush=True)
     except KeyboardInterrupt:
         say(f"{program}: interrupted")
         return INTERRUPTED

@@ -1,4 +1,7 @@
-"""Ctrl-C and SIGTERM: the first asks for an end, the second is one."""
+"""Ctrl-C and SIGTERM: what they do while a command runs.
+
+Before and after that Ctrl-C ends the process at once, see :mod:`drpt`.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +29,37 @@ class Request:
     def status(self) -> int:
         """Exit status by which a shell knows the signal; 0 without one."""
         return 0 if self.signal is None else 128 + self.signal
+
+
+@contextmanager
+def interrupts_raised() -> Iterator[None]:
+    """Let Ctrl-C raise `KeyboardInterrupt` once; the next one does what it did before.
+
+    During an import it ends the process instead: some modules take any exception there for a
+    missing dependency, and go on. A signal that was ignored stays so.
+    """
+    before = signal.getsignal(signal.SIGINT)
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if _imports(frame):
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        signal.signal(number, before)
+        raise KeyboardInterrupt
+
+    if before != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether a frame is part of an import."""
+    while frame is not None and "importlib._bootstrap" not in frame.f_code.co_filename:
+        frame = frame.f_back
+    return frame is not None
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from contextlib import contextmanager, suppress
@@ -36,6 +37,13 @@ def say(line: str) -> None:
     """Print a line to stderr, which may be nobody's any more."""
     with suppress(OSError):
         print(*line.splitlines(), file=sys.stderr)
+
+
+def print_anything() -> None:
+    """Let stdout and stderr escape what their encoding lacks, such as letters of a file's name."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # not None, nor what a caller has put there
+            stream.reconfigure(errors="backslashreplace")
 
 
 def drop_stdout() -> None:

@@ -75,14 +75,17 @@ def measure(
     ``on_pass`` see :func:`reference`. Raises `ValueError` like it.
     """
     per_pass = check_spp(spp) // PASSES
-    launcher = Rendering(scene, per_pass, bounces, mode, sampler=sampler).launcher
+    with backend.interrupts_put_off():
+        launcher = Rendering(scene, per_pass, bounces, mode, sampler=sampler).launcher
     pixels = range(scene.camera.width * scene.camera.height)
     at_once = max(1, LAUNCH_PATHS // (len(pixels) * per_pass))
 
     def sums() -> Iterator[NDArray[np.float64]]:
         for first in range(0, PASSES, at_once):
             group = range(first, min(first + at_once, PASSES))
-            yield from launcher.launch_passes(pixels, range(per_pass), group, seed).radiance
+            with backend.interrupts_put_off():
+                passes = launcher.launch_passes(pixels, range(per_pass), group, seed).radiance
+            yield from passes
 
     return _estimate(scene, spp, sums(), on_pass)
 
