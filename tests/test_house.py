@@ -22,6 +22,7 @@ KNOWS: dict[str, set[str]] = {
     "files": {"messages"},
     "scene": {"files", "immutable", "messages"},
     "kernel": {"immutable", "scene"},
+    "black": {"kernel", "scene"},
     "film": set(),
     "convergence": set(),
     "pooling": set(),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drpt.black import black_because
 from drpt.checkpoint import Checkpoint
 from drpt.distribution import versions
 from drpt.error import squared_differences
@@ -265,6 +266,28 @@ class Rendering:
             jitter=settings.jitter,
         )
 
+    def final_result(self) -> Result:
+        """The picture of the passes that have run; if it is black, its ``warning`` says why."""
+        result = self.result()
+        if result.spp == 0 or result.image.any():
+            return result
+        return replace(result, warning=f"the picture is black: {self._why_black()}")
+
+    def _why_black(self) -> str:
+        settings = self.settings
+        types = backend.load()
+        from drpt.kernel.first_hit import first_seen
+
+        if settings.bounces and not Mode(settings.mode).samples_lights:
+            aimed = Rendering(settings.scene, 1, settings.bounces, Mode.EXPLICIT, error=False)
+            if any(aimed.result().image.any() for _ in aimed.passes()):
+                return (
+                    f"mode {settings.mode} finds lights by chance only, and no path has found one; "
+                    f"take more spp, or mode {Mode.MIS}"
+                )
+        seen = first_seen(types, settings.scene)
+        return black_because(settings.scene, settings.bounces, seen)
+
     def _warning(self) -> str | None:
         if self._first_non_finite is None:
             return None
@@ -403,7 +426,7 @@ def render(  # noqa: PLR0913 -- a setting each
         The same call gives the same bits, if no time limit stops it, whatever the number of threads
         and on every x86-64 CPU with FMA; scenes of so many triangles that Embree meets them were
         measured on one CPU only. Samples that are not finite stay in it, and give a
-        `RuntimeWarning` that says where.
+        `RuntimeWarning` that says where; a black picture gives one that says why.
 
     Raises
     ------
@@ -438,7 +461,7 @@ def render(  # noqa: PLR0913 -- a setting each
         for _ in with_bar(rendering, passes) if bar else passes:
             if on_pass is not None:
                 on_pass(rendering.result())
-    result = rendering.result()
+    result = rendering.final_result()
     if layers:
         result = replace(result, layers={**result.layers, **rendering.first_hits()})
     if result.warning:

@@ -167,7 +167,7 @@ def run(args: argparse.Namespace) -> int:
     with interrupts_noted() as request, _one_line_warnings(args.parser.prog):
         first_hits = rendering.first_hits() if args.layers or args.denoise else {}
         _run(rendering, request, preview, progress=_on_terminal() and not args.quiet)
-        result = _finished(rendering.result(), first_hits, args)
+        result = _finished(rendering.final_result(), first_hits, args)
         places = [_save(result, path, args) for path in outputs]
     if result.warning:
         say(f"{args.parser.prog}: warning: {result.warning}")

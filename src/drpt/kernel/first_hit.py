@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import drjit as dr
 import numpy as np
@@ -17,11 +17,12 @@ import numpy as np
 from drpt.immutable import immutable
 from drpt.kernel.backend import interrupts_put_off
 from drpt.kernel.brdf import make_brdf
-from drpt.kernel.camera import make_camera
+from drpt.kernel.camera import make_camera, picture_plane
 from drpt.kernel.estimator import Features, Mode
 from drpt.kernel.intersect import closest_hit
 from drpt.kernel.launch import Launcher, covered, prepare
 from drpt.kernel.path import Tracer, Vertex
+from drpt.kernel.recording import NONE
 from drpt.kernel.sampler import SAMPLERS
 from drpt.kernel.vec import vec3
 
@@ -93,6 +94,37 @@ def first_hits(
     return {name: immutable(layer.astype(np.float32)) for name, layer in layers.items()}
 
 
+class Seen(NamedTuple):
+    """What the camera sees at the centres of all pixels, row by row.
+
+    ``shape`` (n,) are numbers of shapes, `NONE` for the background; ``front`` (n,) tells whether
+    their front is seen, ``point`` (n, 3) where, in world space.
+    """
+
+    shape: NDArray[np.intp]
+    front: NDArray[np.bool_]
+    point: NDArray[np.float64]
+
+
+def first_seen(types: ModuleType, scene: Scene) -> Seen:
+    """Find what the camera sees first, on the backend ``types``."""
+    with interrupts_put_off():
+        primitives, on_device = prepare(scene.shapes, types)
+        features = replace(_features(primitives), covered_pixels=False)
+        camera = make_camera(scene.camera, primitives.origin, on_device.types)
+        tracer = _PlaceTracer(on_device, features, Mode.IMPLICIT, 0)
+        sampler = SAMPLERS["independent"]
+        launcher = Launcher(tracer, camera, None, sampler, False, 1, primitives)
+    place = _mean(launcher, scene.camera, 1, 0)
+    primitive, distance, front = place.reshape(-1, 3).T
+    plane = picture_plane(scene.camera)
+    y, x, _ = np.indices((*place.shape[:2], 1)).reshape(3, -1, 1) + 0.5
+    ways = plane.corner + x * plane.right + y * plane.down
+    ways *= (distance / np.linalg.norm(ways, axis=1))[:, None]
+    shapes = np.append(primitives.shape, NONE)  # number -1 is the last
+    return Seen(shapes[primitive.astype(np.intp) - 1], front > 0, scene.camera.eye + ways)
+
+
 def _features(primitives: Primitives) -> Features:
     """What first hits need: all surfaces, whether there is light on them or not.
 
@@ -155,6 +187,14 @@ class _NormalTracer(_FirstHitTracer):
         """The normal of a light is not of unit length, and 0 where its centre rounds to the hit."""
         length = dr.norm(hit.shading_normal)
         return dr.select(length > 0, hit.shading_normal / length, -ray.direction)
+
+
+class _PlaceTracer(_FirstHitTracer):
+    """The number of the primitive, from 1 on, the distance, and whether its front is seen."""
+
+    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+        kind = type(hit.distance)
+        return vec3(kind(hit.primitive + 1), hit.distance, dr.select(hit.front, kind(1), 0))
 
 
 @dataclass
