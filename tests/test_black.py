@@ -16,6 +16,8 @@ from tests.scenes import BALL, LAMP, scene_of
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from drpt.scene import Shape
+
 GREY, BLACK = drpt.Diffuse(0.5), drpt.Diffuse(0)
 FLOOR = [(-3, -1, -3), (-3, -1, 3), (3, -1, 3), (3, -1, -3)]
 PANEL = [(-1, 2, -1), (-1, 2, 1), (1, 2, 1), (1, 2, -1)]
@@ -26,14 +28,14 @@ def floor(material: drpt.Diffuse = GREY) -> drpt.Mesh:
     return drpt.Mesh(FLOOR, SQUARE, material=material)
 
 
-def panel(height: float = 0, faces: list[tuple[int, ...]] = SQUARE) -> drpt.Mesh:
+def panel(height: float = 0, faces: list[tuple[int, int, int]] = SQUARE) -> drpt.Mesh:
     """A light above, which faces up; `TURNED`, it faces down."""
     return drpt.Mesh(np.add(PANEL, (0, height, 0)), faces, radiance=10)
 
 
 LID = drpt.Mesh(np.add(FLOOR, (0, 2.5, 0)), SQUARE, material=BLACK)
 BEHIND = drpt.Sphere((0, 1, 9), 1, radiance=3)
-SCENES = {
+SCENES: dict[str, tuple[list[Shape], int, str]] = {
     "no light": ([BALL], 3, "no shape emits light"),
     "no area": (
         [drpt.Mesh(PANEL, [(0, 0, 1)], material=GREY), BEHIND],
@@ -81,7 +83,7 @@ def warned(scene: drpt.Scene, **settings: object) -> list[str]:
     return [str(one.message) for one in caught]
 
 
-def dark(shapes: list[drpt.Sphere | drpt.Mesh]) -> drpt.Scene:
+def dark(shapes: list[Shape]) -> drpt.Scene:
     """A narrow view of what is below, past everything above."""
     camera = drpt.Camera((0, 1, 5), (0, -1, 0), (0, 1, 0), 20, 12, 8)
     return drpt.Scene(camera, shapes)
