@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
+import json
 import os
 import random
 import shutil
@@ -10,6 +13,7 @@ import subprocess
 import sys
 import time
 import warnings
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -383,9 +387,6 @@ class TestDamage:
         assert path.read_bytes() == saved[:-1]
 
     def test_an_array_of_objects_is_not_unpickled(self, path: Path) -> None:
-        import hashlib
-        import io
-
         class Bomb:
             def __reduce__(self) -> Any:
                 return (os.mkdir, (str(path.parent / "exploded"),))
@@ -402,6 +403,174 @@ class TestDamage:
             with np.load(stream, allow_pickle=False) as archive:
                 assert {"state", "total", "blocks"} <= set(archive)
                 assert all(array.dtype.kind in "fU" for array in archive.values())
+
+
+def sealed(body: bytes) -> bytes:
+    """A checkpoint with a valid checksum of whatever it holds."""
+    return MAGIC + hashlib.sha256(body).digest() + body
+
+
+def archive(compression: int = zipfile.ZIP_STORED, **members: Any) -> bytes:
+    """An NPZ archive of arrays, or of members as they are."""
+    body = io.BytesIO()
+    with zipfile.ZipFile(body, "w", compression) as file:
+        for name, member in members.items():
+            stream = io.BytesIO()
+            np.save(stream, member, allow_pickle=False) if isinstance(member, np.ndarray) else None
+            file.writestr(f"{name}.npy", stream.getvalue() or member)
+    return body.getvalue()
+
+
+WRONG_FACTS: list[tuple[str, Any, str]] = [
+    ("spp", 0, "spp: 0 is not allowed; it must be a whole number from 1 to 100"),
+    ("spp", 101, "spp: 101 is not allowed"),
+    ("spp", "32", "spp: '32' is not allowed"),
+    ("spp", 32.0, "spp: 32.0 is not allowed"),
+    ("spp", True, "spp: True is not allowed"),
+    ("spp", [[1]] * 50, "spp: [[1], [1]"),
+    ("block", 0, "block: 0 is not allowed"),
+    ("block", 3, "block: 3 is not allowed; it must be a power of two"),
+    ("block", 1, "block: 1 is not allowed; it must be a power of two, at most 8 of which hold 32"),
+    ("block", 2**20, "blocks is an array of"),
+    ("rays", -1, "rays: -1 is not allowed"),
+    ("rays", None, "rays: None is not allowed"),
+    ("non_finite", 10**6, "non_finite: 1000000 is not allowed"),
+    ("non_finite", 1, "0 pixels of total are not finite, and 1 samples are said to be so"),
+    ("first_non_finite", [0, 0, 0], "first_non_finite: [0, 0, 0] is not allowed"),
+    ("seconds", float("nan"), "seconds: nan is not allowed"),
+    ("seconds", "long", "seconds: 'long' is not allowed"),
+    ("last_look", [1], "last_look: [1] is not allowed"),
+    ("last_look", [64, "x"], "last_look: 64 is not allowed"),
+]
+
+
+class TestImpossibleContent:
+    @pytest.fixture
+    def saved(self, path: Path) -> dict[str, Any]:
+        run_passes(rendering_of(path), 2)
+        with np.load(io.BytesIO(path.read_bytes()[BODY:])) as arrays:
+            return dict(arrays)
+
+    def refuse(self, content: bytes, path: Path) -> str:
+        path.write_bytes(content)
+        with pytest.raises(CheckpointError) as error:
+            rendering_of(path)
+        assert path.read_bytes() == content
+        assert str(error.value).startswith(f"{path}: ")
+        assert str(error.value).isprintable()
+        assert len(str(error.value)) < 600
+        return str(error.value)
+
+    def with_state(self, saved: dict[str, Any], path: Path, change: Any) -> str:
+        state = json.loads(str(saved["state"]))
+        change(state)
+        return self.refuse(sealed(archive(**{**saved, "state": np.array(json.dumps(state))})), path)
+
+    def test_as_it_is_it_is_taken(self, saved: dict[str, Any], path: Path) -> None:
+        path.write_bytes(sealed(archive(**saved)))
+        assert rendering_of(path).spp == 32
+
+    @pytest.mark.parametrize(("name", "value", "problem"), WRONG_FACTS)
+    def test_wrong_facts(
+        self, name: str, value: Any, problem: str, saved: dict[str, Any], path: Path
+    ) -> None:
+        message = self.with_state(saved, path, lambda state: state["facts"].update({name: value}))
+        assert f"no render can be in its state: {problem}" in message
+
+    @pytest.mark.parametrize("name", ["spp", "rays", "seconds", "last_look"])
+    def test_a_missing_fact(self, name: str, saved: dict[str, Any], path: Path) -> None:
+        message = self.with_state(saved, path, lambda state: state["facts"].pop(name))
+        assert f"{name} is missing" in message
+
+    @pytest.mark.parametrize("name", ["identity", "facts"])
+    @pytest.mark.parametrize("value", [None, [], "x", 3])
+    def test_a_part_that_is_no_table(
+        self, name: str, value: Any, saved: dict[str, Any], path: Path
+    ) -> None:
+        message = self.with_state(saved, path, lambda state: state.update({name: value}))
+        assert f"{name} is missing, or no table" in message
+
+    def test_an_identity_of_other_types(self, saved: dict[str, Any], path: Path) -> None:
+        message = self.with_state(
+            saved, path, lambda state: state["identity"].update(scene="\x1b[2J" + "x" * 5000)
+        )
+        assert "belongs to another render: scene is \\x1b[2J" in message
+        message = self.with_state(saved, path, lambda state: state["identity"].update(spp=[[1]]))
+        assert "identity has a list or a table for spp" in message
+
+    @pytest.mark.parametrize(
+        "text", ["[" * 100000, "3", "null", "{", "[]", '{"identity": 1e999}', "9" * 5000]
+    )
+    def test_a_text_that_is_no_state(self, text: str, saved: dict[str, Any], path: Path) -> None:
+        content = sealed(archive(**{**saved, "state": np.array(text)}))
+        assert "its content cannot be read" in self.refuse(content, path)
+
+    @pytest.mark.parametrize(
+        "state", [np.array(3), np.array(["a"]), np.array(b"{}"), np.zeros((0,)), None]
+    )
+    def test_a_state_that_is_no_text(self, state: Any, saved: dict[str, Any], path: Path) -> None:
+        arrays = {name: array for name, array in saved.items() if name != "state"}
+        arrays |= {} if state is None else {"state": state}
+        assert "the array state is missing, or no text" in self.refuse(
+            sealed(archive(**arrays)), path
+        )
+
+    @pytest.mark.parametrize("name", ["total", "blocks"])
+    def test_wrong_arrays(self, name: str, saved: dict[str, Any], path: Path) -> None:
+        array = saved[name]
+        wrong = (array[..., :2], array[:-1], array.astype(np.float16), array.astype(str), array[0])
+        for found in wrong:
+            message = self.refuse(sealed(archive(**{**saved, name: found})), path)
+            assert f"{name} is an array of " in message
+        others = {key: value for key, value in saved.items() if key != name}
+        assert f"{name} is missing" in self.refuse(sealed(archive(**others)), path)
+
+    @pytest.mark.parametrize("name", ["total", "blocks"])
+    @pytest.mark.parametrize("value", [np.nan, -1, -np.inf])
+    def test_wrong_sums(self, name: str, value: float, saved: dict[str, Any], path: Path) -> None:
+        saved[name][..., 5, 1] = value
+        assert "no render can be in its state: " in self.refuse(sealed(archive(**saved)), path)
+
+    def test_an_archive_that_inflates(self, saved: dict[str, Any], path: Path) -> None:
+        bomb = archive(zipfile.ZIP_DEFLATED, **saved, bomb=np.zeros(10**7))
+        path.write_bytes(sealed(bomb))
+        rendering_of(path)  # which one can: 80 MB
+        bomb = archive(zipfile.ZIP_BZIP2, **saved, bomb=np.zeros(10**6))
+        assert "a method that is not read" in self.refuse(sealed(bomb), path)
+
+    def test_a_header_that_tells_of_too_much(self, saved: dict[str, Any], path: Path) -> None:
+        head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999, 3), }"
+        head = head.ljust(117) + b"\n"
+        member = b"\x93NUMPY\1\0" + len(head).to_bytes(2, "little") + head
+        message = self.refuse(sealed(archive(**{**saved, "total": member})), path)
+        assert "its header tells of 2.4 PB, and 0 bytes follow" in message
+
+    def test_sizes_that_the_archive_cannot_hold(self, saved: dict[str, Any], path: Path) -> None:
+        content = bytearray(archive(**saved))
+        entry = content.index(b"PK\1\2")
+        content[entry + 24 : entry + 28] = (2**31).to_bytes(4, "little")
+        assert "is said to be 2.147 GB, which" in self.refuse(sealed(bytes(content)), path)
+
+    @pytest.mark.parametrize("body", [b"", b"PK\5\6", b"PK\5\6" + bytes(18), bytes(1000)])
+    def test_what_is_no_archive(self, body: bytes, path: Path) -> None:
+        assert "its content cannot be read" in self.refuse(sealed(body), path)
+
+    @pytest.mark.parametrize("line", [b"\xff\xfe\n", b"\x1b[2J\n", b"\0\0"])
+    def test_first_bytes_that_are_no_text(self, line: bytes, path: Path) -> None:
+        assert "its format is " in self.refuse(FORMAT + line + bytes(100), path)
+        assert "this is no checkpoint" in self.refuse(line * 50, path)
+
+
+def test_an_interrupt_before_the_first_pass_leaves_no_checkpoint(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Launcher, "launch", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        finish(rendering_of(path))
+    assert list(path.parent.iterdir()) == []
 
 
 class TestLock:

@@ -19,7 +19,7 @@ KNOWS: dict[str, set[str]] = {
     "messages": set(),
     "distribution": set(),
     "machine": {"messages"},
-    "files": {"messages"},
+    "files": {"machine", "messages"},
     "scene": {"files", "immutable", "messages"},
     "kernel": {"immutable", "scene"},
     "black": {"kernel", "scene"},
@@ -33,7 +33,8 @@ KNOWS: dict[str, set[str]] = {
     "notebook": {"output"},
     "settings": {"kernel", "scene"},
     "stopping": {"settings"},
-    "checkpoint": {"files"},
+    "checkpoint": {"files", "messages"},
+    "state": {"film", "settings"},
     "result": {
         "denoise",
         "distribution",

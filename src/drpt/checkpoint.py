@@ -9,13 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import zipfile
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drpt.files import PathLock, replacing
+from drpt.files import PathLock, open_regular, read_npz, replacing
+from drpt.messages import one_line, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     Facts = Mapping[str, str | int | float | bool | list[int] | list[float] | None]
     Arrays = Mapping[str, NDArray[Any]]
 
+MAX_SHOWN = 100
+"""Characters of a value that an error shows."""
 FORMAT = b"drpt checkpoint "
 MAGIC = FORMAT + b"1\n"
 BODY = len(MAGIC) + hashlib.sha256().digest_size
@@ -69,16 +71,16 @@ class Checkpoint:
         """Let others have it."""
         self._lock.release()
 
-    def load(self) -> tuple[dict[str, Any], Arrays] | None:
+    def load(self) -> tuple[Mapping[str, Any], Arrays] | None:
         """Facts and arrays that were saved last; None if there is no file.
 
         Raises `CheckpointError` for what is no checkpoint of this render, and `OSError`.
         """
         if not self.path.exists():
             return None
-        state, arrays = _read(self.path)
-        _compare(self.path, state["identity"], self._identity)
-        return state["facts"], arrays
+        identity, facts, arrays = _read(self.path)
+        _compare(self.path, identity, self._identity)
+        return facts, arrays
 
     def is_due(self) -> bool:
         """Whether it is time to save again."""
@@ -103,23 +105,40 @@ def _lock_path(path: Path) -> Path:
     return file.with_name(f".drpt-{token}.lock")
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    with open(path, "rb") as stream:
+def _read(path: Path) -> tuple[Mapping[str, Any], Mapping[str, Any], Arrays]:
+    """Return identity, facts and arrays of a file."""
+    with open_regular(path) as stream:
         magic = stream.readline(len(MAGIC))
         if not magic.startswith(FORMAT):
             raise CheckpointError(f"{path}: this is no checkpoint of drpt")
         if magic != MAGIC:
-            there, here = (line.removeprefix(FORMAT).strip().decode() for line in (magic, MAGIC))
+            there, here = (_version(line) for line in (magic, MAGIC))
             raise CheckpointError(f"{path}: its format is {there}, and this version reads {here}")
         if stream.read(BODY - len(MAGIC)) != _digest(stream):
             raise CheckpointError(f"{path}: it is damaged: its checksum is not that of its content")
-        stream.seek(BODY)
         try:
-            with np.load(stream, allow_pickle=False) as archive:
-                arrays = dict(archive)
-                return json.loads(str(arrays.pop("state"))), arrays
-        except (KeyError, ValueError, zipfile.BadZipFile) as error:
+            arrays = read_npz(stream)
+            return *_parse(arrays.pop("state", None)), arrays
+        except (ValueError, RecursionError) as error:
             raise CheckpointError(f"{path}: its content cannot be read ({error})") from error
+
+
+def _version(line: bytes) -> str:
+    return one_line(line.removeprefix(FORMAT).decode("ascii", "backslashreplace"))
+
+
+def _parse(state: NDArray[Any] | None) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """Return identity and facts, which a text in an array tells as JSON."""
+    if state is None or state.dtype.kind != "U" or state.shape:
+        raise ValueError("the array state is missing, or no text")
+    table = json.loads(str(state))
+    for name in ("identity", "facts"):
+        if not isinstance(table, dict) or not isinstance(table.get(name), dict):
+            raise ValueError(f"{name} is missing, or no table")
+    for name, value in table["identity"].items():
+        if isinstance(value, list | dict):
+            raise ValueError(f"identity has a list or a table for {shortened(name, MAX_SHOWN)}")
+    return table["identity"], table["facts"]
 
 
 def _digest(stream: BinaryIO) -> bytes:
@@ -132,12 +151,12 @@ def _compare(path: Path, there: Facts, here: Facts) -> None:
     for name in here:
         if there.get(name) != here[name]:
             old, new = _difference(str(there.get(name)), str(here[name]))
-            raise CheckpointError(
-                f"{path}: it belongs to another render: {name} is {old} there and {new} here"
-            )
+            difference = one_line(f"{name} is {old} there and {new} here")
+            raise CheckpointError(f"{path}: it belongs to another render: {difference}")
 
 
 def _difference(there: str, here: str) -> tuple[str, str]:
     """The first lines that differ."""
     pairs = zip(there.splitlines(), here.splitlines(), strict=False)
-    return next(((old, new) for old, new in pairs if old != new), (there[-40:], here[-40:]))
+    old, new = next((pair for pair in pairs if pair[0] != pair[1]), (there[-40:], here[-40:]))
+    return shortened(old, MAX_SHOWN), shortened(new, MAX_SHOWN)

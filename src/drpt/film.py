@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -102,7 +102,7 @@ class Film:
         return self._blocks[: 4 if full >= 4 else 2 if full >= 2 else 0]
 
     @property
-    def state(self) -> dict[str, NDArray[np.float64] | NDArray[np.float32]]:
+    def state(self) -> dict[str, NDArray[Any]]:
         """Arrays with which, ``samples`` and ``size`` :meth:`restore` makes an equal film."""
         used = -(-self.samples // self.size)
         return {"total": self._total, "blocks": self._blocks[:used]}

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drpt.black import black_because
-from drpt.checkpoint import Checkpoint
+from drpt.checkpoint import Checkpoint, CheckpointError
 from drpt.distribution import versions
 from drpt.error import squared_differences
 from drpt.files import check_file
@@ -27,10 +27,11 @@ from drpt.progress import with_bar
 from drpt.result import SAMPLES, Result
 from drpt.scene.saving import to_toml
 from drpt.settings import SAMPLERS, Settings, check_positive, check_switch, check_whole, refuse
+from drpt.state import State
 from drpt.stopping import Stopping
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Mapping
 
     from numpy.typing import NDArray
 
@@ -308,16 +309,25 @@ class Rendering:
         check_file(path)
         checkpoint = Checkpoint(path, self._identity(), interval)
         checkpoint.lock()
-        if saved := checkpoint.load():
-            facts, arrays = saved
-            self._film.restore(arrays["total"], arrays["blocks"], facts["spp"], facts["block"])
-            self._rays, self._non_finite = facts["rays"], facts["non_finite"]
-            first = facts["first_non_finite"]
-            self._first_non_finite = None if first is None else tuple(first)
-            self._seconds = facts["seconds"]
-            look = facts["last_look"]
-            self._stopping.last_look = None if look is None else tuple(look)
+        try:
+            if saved := checkpoint.load():
+                self._restore(checkpoint.path, *saved)
+        except BaseException:
+            checkpoint.unlock()
+            raise
         return checkpoint
+
+    def _restore(self, path: Path, facts: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
+        """Become the render that a checkpoint tells of, if there can be such a one."""
+        try:
+            state = State.checked(facts, arrays, self.settings, error=self._has_error)
+        except ValueError as error:
+            raise CheckpointError(f"{path}: no render can be in its state: {error}") from error
+        self._film.restore(state.total, state.blocks, state.spp, state.block)
+        self._rays, self._non_finite = state.rays, state.non_finite
+        self._first_non_finite = state.first_non_finite
+        self._seconds = state.seconds
+        self._stopping.last_look = state.last_look
 
     def _identity(self) -> dict[str, str | int | bool | None]:
         """All that decides about the bits of the picture; the CPU and its threads do not."""
@@ -343,19 +353,21 @@ class Rendering:
 
     def _save(self) -> None:
         """Save the passes that have run, if that is wanted; a render goes on where that fails."""
-        if self._checkpoint is None or self._film.ahead:
+        film = self._film
+        if self._checkpoint is None or film.ahead or not film.samples:
             return
-        facts = {
-            "spp": self.spp,
-            "block": self._film.size,
-            "rays": self._rays,
-            "non_finite": self._non_finite,
-            "first_non_finite": self._first_non_finite and list(self._first_non_finite),
-            "seconds": self._seconds,
-            "last_look": self._stopping.last_look and list(self._stopping.last_look),
-        }
+        state = State(
+            spp=film.samples,
+            block=film.size,
+            rays=self._rays,
+            non_finite=self._non_finite,
+            first_non_finite=self._first_non_finite,
+            seconds=self._seconds,
+            last_look=self._stopping.last_look,
+            **film.state,
+        )
         try:
-            self._checkpoint.save(facts, self._film.state)
+            self._checkpoint.save(state.facts, state.arrays)
         except OSError as error:
             warnings.warn(f"no checkpoint: {error}", RuntimeWarning, stacklevel=2)
 

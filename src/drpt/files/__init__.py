@@ -1,5 +1,6 @@
 """Files: read only if they are regular and not too large, written whole or not at all."""
 
+from drpt.files.archives import read_npy, read_npz
 from drpt.files.locking import PathLock
 from drpt.files.reading import check_regular, open_regular, read_bytes
 from drpt.files.writing import check_file, replacing, write_file
@@ -10,6 +11,8 @@ __all__ = [
     "check_regular",
     "open_regular",
     "read_bytes",
+    "read_npy",
+    "read_npz",
     "replacing",
     "write_file",
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from drpt.files import check_file, replacing
+from drpt.files import check_file, open_regular, read_npy, replacing
 from drpt.output.display import check_look, to_display
 from drpt.output.exr import read_exr_layers, write_exr
 from drpt.output.metadata import to_header
@@ -126,11 +126,11 @@ def read(
 
 
 def _read_npy(path: str | os.PathLike[str]) -> NDArray[np.float32]:
-    with open(path, "rb") as stream:
+    with open_regular(path) as stream:
         try:
-            array = np.lib.format.read_array(stream, allow_pickle=False)
+            array = read_npy(stream)
         except ValueError as error:
-            raise ValueError(f"{path}: this is not a readable NPY file ({error})") from error
+            raise ValueError(f"{path}: {error}") from error
     if array.ndim != 3 or array.shape[2] != 3 or not array.size or array.dtype.kind != "f":
         found = f"{array.dtype} {array.shape}"
         raise ValueError(f"{path}: its array is {found}; it must be of floats (height, width, 3)")

@@ -18,6 +18,7 @@ from zipfile import is_zipfile
 
 import numpy as np
 
+from drpt.files import read_npz
 from drpt.scene import checks
 from drpt.scene.checks import SceneError
 from drpt.scene.polygons import triangulate, warn_of_flaws
@@ -73,12 +74,12 @@ def _read_npz(content: bytes, _: Path) -> MeshArrays:
     if not is_zipfile(io.BytesIO(content)):
         raise SceneError("it is not an NPZ file")
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return MeshArrays(arrays["v"], arrays["f"], arrays.get("vn"))
-    except KeyError:
-        raise SceneError("it must hold the arrays 'v' and 'f', and may hold 'vn'") from None
-    except Exception as error:  # NumPy and zipfile let many through, even MemoryError
-        raise SceneError(f"it is not an NPZ file of plain arrays: {error}") from None
+        arrays = read_npz(io.BytesIO(content))
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+    if not {"v", "f"} <= arrays.keys():
+        raise SceneError("it must hold the arrays 'v' and 'f', and may hold 'vn'")
+    return MeshArrays(arrays["v"], arrays["f"], arrays.get("vn"))
 
 
 def _read_ply(content: bytes, path: Path) -> MeshArrays:
