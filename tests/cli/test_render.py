@@ -154,6 +154,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
     machine = SimpleNamespace(name="llvm", llvm_version="22", vector_width=8)
     monkeypatch.setattr(render, "Rendering", fake.rendering)
     monkeypatch.setattr(drpt.Rendering, "launcher", fake)
+    monkeypatch.setattr(drpt.Rendering, "_digest", lambda _: "that of the launcher")
     monkeypatch.setattr(backend, "load", lambda: None)
     monkeypatch.setattr(backend, "describe", lambda: machine)
     return fake
@@ -607,7 +608,11 @@ class TestInterrupt:
     def test_while_the_picture_is_written_lets_it_be(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        monkeypatch.setattr(os, "fsync", lambda _: signal.raise_signal(signal.SIGTERM))
+        def fsync(_: int) -> None:  # of the file, and of its folder
+            monkeypatch.setattr(os, "fsync", lambda _: None)
+            signal.raise_signal(signal.SIGTERM)
+
+        monkeypatch.setattr(os, "fsync", fsync)
         assert cli.render_main(["good.toml", "--quiet"]) == 143
         assert read_exr("good.exr")[1]["partial"] is False
         assert capsys.readouterr() == ("", STOPPING)
