@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from collections import deque
 from contextlib import contextmanager
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
     from drpt.view.worker import Worker
 
 HELLO = "hello"
+# A handshake; the key is the one of RFC 6455.
+UPGRADE = (
+    "GET /ws HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nConnection: Upgrade\r\n"
+    "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+)
 # Seconds after which what was waited for does not come.
 PATIENCE = 10
 LOCAL = Guard("127.0.0.1", "127.0.0.1")
@@ -80,3 +87,19 @@ def serving(worker: FakeWorker, guard: Guard = LOCAL) -> Iterator[str]:
         end.set()
         thread.join(PATIENCE)
         assert not thread.is_alive()
+
+
+def raw_connection(place: str) -> socket.socket:
+    host, port = place.split(":")
+    return socket.create_connection((host, int(port)), PATIENCE)
+
+
+def raw_client(place: str) -> socket.socket:
+    """A socket on which a session has said hello, and nothing is read since."""
+    plain = raw_connection(place)
+    plain.sendall(UPGRADE.format(place).encode())
+    answer = b""
+    while not answer.endswith(HELLO.encode()):
+        answer += plain.recv(2**12)
+    assert answer.startswith(b"HTTP/1.1 101 ")
+    return plain

@@ -18,7 +18,7 @@ from drpt.view import server, serving
 from drpt.view.security import HEADERS, Guard
 from drpt.view.serving import GRACE, MESSAGE_BYTES
 from tests.view import fakes
-from tests.view.fakes import HELLO, PATIENCE, FakeSession, FakeWorker
+from tests.view.fakes import HELLO, PATIENCE, FakeSession, FakeWorker, raw_client
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,12 +28,6 @@ if TYPE_CHECKING:
 
 # More than sockets and the server hold for a client that does not read.
 FLOOD = bytes(2**24)
-# A handshake; the key is the one of RFC 6455.
-UPGRADE = (
-    "GET /ws HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nConnection: Upgrade\r\n"
-    "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
-    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-)
 INDEX = "<title>the index</title>"
 
 
@@ -92,18 +86,6 @@ def get(place: str, path: str) -> Answer:
     answer = Answer(response.status, response.headers, response.read().decode())
     connection.close()
     return answer
-
-
-def raw_client(place: str) -> socket.socket:
-    """A socket on which a session has said hello, and nothing is read since."""
-    host, port = place.split(":")
-    plain = socket.create_connection((host, int(port)), PATIENCE)
-    plain.sendall(UPGRADE.format(place).encode())
-    answer = b""
-    while not answer.endswith(HELLO.encode()):
-        answer += plain.recv(2**12)
-    assert answer.startswith(b"HTTP/1.1 101 ")
-    return plain
 
 
 def closing(client: ClientConnection) -> tuple[int, str]:

@@ -15,6 +15,7 @@ from drpt.output import read
 from drpt.view.frames import half_floats, stops_of
 from drpt.view.scenes import Scenes
 from drpt.view.session import MAX_FRAMES, MAX_WAITING, ProtocolError, Session
+from drpt.view.shares import Urgency
 from drpt.view.show import REFERENCE_SPP
 
 if TYPE_CHECKING:
@@ -107,6 +108,18 @@ def test_a_view_brings_its_scene_and_then_frames() -> None:
     frame = browser.take_binary()
     assert (frame.header["type"], frame.header["number"], frame.header["half"]) == ("frame", 1, 0)
     assert frame.header["spp"] > 0
+
+
+def test_what_is_waited_for_is_urgent() -> None:
+    browser = Browser()
+    browser.view(halves=[MIS], spp=64)
+    seen: list[Urgency] = []
+    while (urgency := browser.session.urgency()) is not None and len(seen) < 5:
+        seen.append(urgency)
+        browser.step()
+    change, show, refine = Urgency.CHANGE, Urgency.SHOW, Urgency.REFINE
+    assert seen[:3] == [change, change, show]
+    assert set(seen[3:]) <= {refine}
 
 
 def test_it_refines_until_all_samples_are_there_and_shows_what_render_gives() -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import drpt
+from drpt.view.shares import Urgency
 from drpt.view.worker import MAX_SESSIONS, TooManySessions, Worker
 
 if TYPE_CHECKING:
@@ -98,6 +99,41 @@ def test_a_change_is_seen_before_others_are_refined(worker: Worker) -> None:
     clients[0].view(2**20)
     wait_for(1, *clients)
     assert sum(client.frames for client in clients[1:]) - before < len(clients) - 1
+
+
+class Asking:
+    """A session that always waits for a step, until a clock has come to an end."""
+
+    END = 200.0
+    clock = 0.0
+
+    def __init__(self, seconds: float, urgency: Urgency) -> None:
+        self._seconds, self._urgency = seconds, urgency
+        self.used = 0.0
+
+    def urgency(self) -> Urgency | None:
+        return self._urgency if Asking.clock < Asking.END else None
+
+    def step(self) -> None:
+        self.used += self._seconds
+        Asking.clock += self._seconds
+
+
+def test_who_asks_for_kernels_leaves_others_their_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    asking = [Asking(1.5, Urgency.CHANGE), *(Asking(0.1, Urgency.REFINE) for _ in range(3))]
+    opened = iter(asking)
+    monkeypatch.setattr("drpt.view.worker.Session", lambda *_: next(opened))
+    monkeypatch.setattr("drpt.view.worker.perf_counter", lambda: Asking.clock)
+    worker = Worker("furnace")
+    for _ in asking:
+        worker.open(lambda: None)
+    worker.start()
+    end = time.monotonic() + PATIENCE
+    while Asking.clock < Asking.END:
+        assert time.monotonic() < end, "nobody is served"
+        time.sleep(0.001)
+    worker.stop()
+    assert [session.used for session in asking] == pytest.approx([50, 50, 50, 50], abs=3)
 
 
 def test_there_is_an_end_to_sessions(worker: Worker) -> None:

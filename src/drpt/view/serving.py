@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import uvicorn
 
+from drpt.view.connections import HttpConnection, WebSocketConnection
 from drpt.view.security import in_url
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ MESSAGE_BYTES = 2**16
 """The longest message that a client may send; the state of a view takes a few kilobytes."""
 PATIENCE = 30
 """Seconds that a client may leave data untaken before it counts as gone."""
+PING_SECONDS = 20.0
+"""How often a WebSocket's client is asked for a sign of life, and how long it has to give one."""
 GRACE = 1
 """Seconds that clients have, when the server ends, to take what they have been sent."""
 
@@ -89,12 +92,16 @@ class Server(uvicorn.Server):
     def __init__(self, app: ASGIApp, ended: Callable[[], bool]) -> None:
         config = uvicorn.Config(
             app,
-            log_config=None,  # warnings alone, to stderr
+            log_config=None,
+            log_level="error",  # of drpt: what clients do wrong is not told
             access_log=False,
             lifespan="off",
             proxy_headers=False,
             server_header=False,
-            ws="websockets-sansio",
+            http=HttpConnection,
+            ws=WebSocketConnection,
+            ws_ping_interval=PING_SECONDS,
+            ws_ping_timeout=PING_SECONDS,
             ws_max_size=MESSAGE_BYTES,
             ws_per_message_deflate=False,  # noise does not compress
         )

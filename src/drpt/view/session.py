@@ -23,6 +23,7 @@ from drpt.settings import check_choice, check_number, check_switch, check_whole
 from drpt.view.descriptions import describe_scene, hello
 from drpt.view.frames import pack
 from drpt.view.saving import FORMATS, picture_file, scene_file
+from drpt.view.shares import Urgency
 from drpt.view.show import Show
 from drpt.view.state import MAX_SEED, read_state
 
@@ -58,10 +59,10 @@ class _Save(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """Something to do; what is ``urgent`` is waited for."""
+    """Something to do."""
 
     do: Callable[[], None]
-    urgent: bool = True
+    urgency: Urgency = Urgency.CHANGE
 
 
 class Session:
@@ -152,13 +153,17 @@ class Session:
 
     # --- the render thread ------------------------------------------------------------------------
 
-    def has_work(self, *, urgent: bool = False) -> bool:
-        """Whether :meth:`step` would do anything; if ``urgent``, more than refine what is seen."""
+    def urgency(self) -> Urgency | None:
+        """How urgent :meth:`step` is; None where there is nothing to do."""
         with self._lock:
             if len(self._messages) >= MAX_WAITING:
-                return False
+                return None
             step = self._next_step()
-            return step is not None and (step.urgent or not urgent)
+            return None if step is None else step.urgency
+
+    def has_work(self) -> bool:
+        """Whether :meth:`step` would do anything."""
+        return self.urgency() is not None
 
     def step(self) -> None:
         """Do what waits first: heed a wish, send a frame, or take some more samples."""
@@ -187,12 +192,14 @@ class Session:
         """Frames first, then what has no samples yet, paths before further samples."""
         render = show.next_render(paused=self._paused)
         if (half := show.next_stale(self._frames.keys(), idle=render is None)) is not None:
-            return _Step(partial(self._send_frame, show, half))
+            urgency = Urgency.REFINE if show.has_shown(half) else Urgency.SHOW
+            return _Step(partial(self._send_frame, show, half), urgency)
         if (render is None or render.spp) and (half := show.next_untold()) is not None:
             return _Step(partial(self._tell_paths, show, half))
         if render is None:
             return None
-        return _Step(partial(show.advance, render), urgent=not render.spp)
+        urgency = Urgency.REFINE if render.spp else Urgency.CHANGE
+        return _Step(partial(show.advance, render), urgency)
 
     def _change_view(self) -> None:
         with self._lock:

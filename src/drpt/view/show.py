@@ -88,6 +88,10 @@ class Show:
         """Whether there was a frame of every half."""
         return not self._unseen
 
+    def has_shown(self, half: int) -> bool:
+        """Whether there was a frame of a half."""
+        return half not in self._unseen
+
     def next_stale(self, waiting: Collection[int], *, idle: bool) -> int | None:
         """A half of which there is more to see than in its last frame.
 

@@ -1,14 +1,15 @@
-"""The render thread, which serves all sessions in turn."""
+"""The render thread, which gives all sessions equal shares of its time."""
 
 from __future__ import annotations
 
-from collections import deque
 from threading import Condition, Thread
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 from drpt.kernel import backend
 from drpt.view.scenes import Scenes
 from drpt.view.session import Session
+from drpt.view.shares import Shares
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +23,7 @@ class TooManySessions(RuntimeError):  # noqa: N818 -- it says what is wrong
 
 
 class Worker:
-    """Renders what sessions show, a step of one after a step of another.
+    """Renders what sessions show, a step of one after a step of another, in equal shares of time.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ class Worker:
         self, scene_name: str, *, width: int | None = None, height: int | None = None
     ) -> None:
         self._scenes = Scenes(scene_name, width, height)
-        self._sessions: deque[Session] = deque()
+        self._shares = Shares[Session]()
         self._change = Condition()
         self._stopping = False
         self._thread = Thread(target=self._run, name="render")
@@ -62,16 +63,15 @@ class Worker:
         """
         session = Session(self._scenes, ready, self._wake)
         with self._change:
-            if len(self._sessions) == MAX_SESSIONS:
+            if len(self._shares.members) == MAX_SESSIONS:
                 raise TooManySessions(f"{MAX_SESSIONS} viewers at most")
-            self._sessions.append(session)
+            self._shares.join(session)
         return session
 
     def close(self, session: Session) -> None:
         """Forget a session, if it is there."""
         with self._change:
-            if session in self._sessions:
-                self._sessions.remove(session)
+            self._shares.leave(session)
 
     def _wake(self) -> None:
         with self._change:
@@ -79,21 +79,20 @@ class Worker:
 
     def _run(self) -> None:
         while (session := self._next()) is not None:
+            start = perf_counter()
             session.step()
+            with self._change:
+                self._shares.charge(session, perf_counter() - start)
 
     def _next(self) -> Session | None:
         """Wait for a session with something to do; None at the end."""
         with self._change:
             while not self._stopping:
-                if session := self._next_in_turn(urgent=True) or self._next_in_turn(urgent=False):
+                found = {session: session.urgency() for session in self._shares.members}
+                waiting = {
+                    session: urgency for session, urgency in found.items() if urgency is not None
+                }
+                if session := self._shares.next(waiting):
                     return session
                 self._change.wait()
-        return None
-
-    def _next_in_turn(self, *, urgent: bool) -> Session | None:
-        for session in self._sessions:
-            if session.has_work(urgent=urgent):
-                self._sessions.remove(session)
-                self._sessions.append(session)
-                return session
         return None
