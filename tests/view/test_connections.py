@@ -77,7 +77,7 @@ def at() -> Iterator[str]:
 def quiet(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
     """Nothing is logged, by whomever."""
     yield
-    assert caplog.records == []
+    assert caplog.get_records("call") == []
 
 
 @pytest.fixture
