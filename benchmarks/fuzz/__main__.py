@@ -11,6 +11,8 @@ from benchmarks.fuzz.worker import load
 
 TARGETS = (
     "exr",
+    "meshes",
+    "mitsuba",
     "scenes",
 )
 """Modules of this package, each with a ``TARGET``."""

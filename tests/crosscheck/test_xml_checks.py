@@ -134,6 +134,13 @@ def test_null_characters_are_refused(tmp_path: Path) -> None:
         from_mitsuba(tmp_path / "a.xml")
 
 
+@pytest.mark.parametrize("text", ['<shape type="\xff"/>', '<string name="\xff" value="1"/>'])
+def test_texts_that_are_not_utf_8_are_refused(mi: Any, tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.xml").write_bytes(scene(SENSOR, text).encode("latin-1"))
+    with pytest.raises(SceneError, match=r"a\.xml"):
+        from_mitsuba(tmp_path / "a.xml")
+
+
 def test_dicts_in_dicts_are_refused() -> None:
     table: dict[str, Any] = {"type": "scene"}
     table["me"] = table

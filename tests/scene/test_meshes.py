@@ -256,6 +256,12 @@ def test_bad_paths(tmp_path: Path) -> None:
         load_mesh(tmp_path / "folder.obj")
 
 
+def test_lights_without_area_name_the_file(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", v=np.eye(3), f=[[0, 1, 1]])
+    with pytest.raises(SceneError, match=r"a\.npz: faces: they have no area"):
+        Mesh.load(tmp_path / "a.npz", radiance=1)
+
+
 def test_bad_arrays_name_the_file(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", v=np.eye(3), f=[[0, 1, 3]])
     with pytest.raises(SceneError) as caught:

@@ -152,8 +152,8 @@ class Element:
             yield
         except SceneError as error:
             raise error if error.source else error.within(self.tag).in_file(self.place) from None
-        except RuntimeError as error:
-            raise self.refuse(_plain(str(error))) from None
+        except (RuntimeError, UnicodeDecodeError) as error:
+            raise self.refuse(_message(error)) from None
 
 
 @contextmanager
@@ -174,6 +174,9 @@ def parsed(mi: Any, source: str | PathLike[str] | dict[str, Any]) -> Iterator[El
             check_xml(mi, Path(source))
             resolver.prepend(str(Path(source).parent))
         yield _root(mi, source)
+    except UnicodeDecodeError as error:
+        problem = f"a text in it is not UTF-8: {checks.show(error.object)}"
+        raise SceneError(problem, source="" if isinstance(source, dict) else str(source)) from None
     finally:
         mi.set_file_resolver(previous)
 
@@ -187,9 +190,18 @@ def _root(mi: Any, source: str | PathLike[str] | dict[str, Any]) -> Element:
             state = mi.parser.parse_file(config, str(source))
         mi.parser.transform_upgrade(config, state)
         mi.parser.transform_resolve(config, state)
-    except RuntimeError as error:
-        raise SceneError(_plain(str(error))) from None
+    except (RuntimeError, UnicodeDecodeError) as error:
+        message = _message(error)
+        source = "" if isinstance(source, dict) or str(source) in message else str(source)
+        raise SceneError(message, source=source) from None
     return Element(mi, state, state.root)
+
+
+def _message(error: RuntimeError | UnicodeDecodeError) -> str:
+    """Return a message of Mitsuba's, which may quote text that is not UTF-8."""
+    if isinstance(error, UnicodeDecodeError):
+        return _plain(bytes(error.object).decode(errors="replace"))
+    return _plain(str(error))
 
 
 def _plain(message: str) -> str:

@@ -46,13 +46,25 @@ def read_bytes(path: Path, most: int) -> bytes:
     """
     with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
-        content = b"" if size > most else stream.read(most + 1)
+        content = b"" if size > most else _read(stream, size, most)
     size = max(size, len(content))
     if size > most:
         problem = (
             f"it has {size_in_words(size)}, and it must have no more than {size_in_words(most)}"
         )
         raise OSError(errno.EFBIG, problem, os.fspath(path))
+    return content
+
+
+def _read(stream: BinaryIO, size: int, most: int) -> bytes:
+    """Return what a file of a known size has, and what it grows by, but ``most + 1`` at the most.
+
+    Python reserves memory for all bytes that it is asked for, whether they are there or not.
+    """
+    content = stream.read(size + 1)
+    while size < len(content) <= most:
+        size = len(content)
+        content += stream.read(min(max(size, 2**16), most + 1 - size))
     return content
 
 

@@ -187,7 +187,6 @@ def make_launcher(
     the same without.
     """
     primitives, device_scene = prepare(scene.shapes, types)
-    device_scene = device_scene.seen_from(scene.camera.eye - primitives.origin, primitives)
     features = Features.of(primitives, bounces, mode)
     if not (features.diffuse or features.phong):
         bounces = 0

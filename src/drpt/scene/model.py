@@ -254,7 +254,10 @@ class Mesh(_Surface, Immutable):
             black = cls(vertices, faces, normals, radiance=0)
         except SceneError as error:
             raise error.in_file(str(path)) from None
-        return cls(black.vertices, black.faces, black.normals, material, radiance)
+        try:
+            return cls(black.vertices, black.faces, black.normals, material, radiance)
+        except SceneError as error:  # of the arguments, or of faces without area that are a light
+            raise (error.in_file(str(path)) if error.field == "faces" else error) from None
 
     def areas(self) -> NDArray[np.float64]:
         """Return the area of each triangle, shape (m,)."""
