@@ -186,8 +186,8 @@ def geometric_importance(at: Receiver, ball: Array4f) -> Float:
     to_center = vec3(ball[0], ball[1], ball[2]) - at.point
     middle = dr.dot(to_center, at.normal)
     height = greater(greater(middle, (middle + radius) / 2), 0)
-    inverse = dr.rsqrt(greater(dr.squared_norm(to_center), dr.square(radius)))
-    return height * inverse * inverse * inverse
+    squared = greater(dr.squared_norm(to_center), dr.square(radius))
+    return height / (squared * dr.sqrt(squared))
 
 
 def nodes_of(lights: Array, count: int) -> Array:
