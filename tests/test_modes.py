@@ -229,7 +229,7 @@ def spheres_in_a_corner() -> list[Shape]:
     place = np.random.default_rng(1).uniform([-0.9, 0.1, -0.9], [-0.7, 0.3, -0.7], (70, 3))
     lamp = drpt.Sphere((0.4, 0.5, 0.3), 0.2, radiance=3)
     dull = drpt.Diffuse(0.5)
-    return [*(drpt.Sphere(p, 0.02, dull) for p in place), lamp, replace_surface(lamp, dull)]
+    return [*(drpt.Sphere(p, 0.02, dull) for p in place), replace_surface(lamp, dull), lamp]
 
 
 def replace_surface(sphere: drpt.Sphere, material: drpt.Diffuse) -> drpt.Sphere:
@@ -261,6 +261,15 @@ def overlapping_panels() -> list[Shape]:
     return [*small, drpt.Mesh(corners, [[0, 1, 2], [0, 2, 3]], radiance=3)]
 
 
+def cut_panels() -> list[Shape]:
+    """The panels, of which later patches cover half of one and a hole in the other."""
+    half = np.array([[-0.3, 2, -0.3], [0.3, 2, -0.3], [0.3, 2, 0.0], [-0.4, 2, 0.0]])
+    hole = np.array([[-0.1, 0, -0.1], [-0.1, 0, 0.2], [0.2, 0, 0.1], [0.1, 0, -0.2]])
+    quad = [[0, 1, 2], [0, 2, 3]]
+    patches = (drpt.Mesh(corners, quad, material=drpt.Diffuse(0.1)) for corners in (half, hole))
+    return [*panels(), *patches]
+
+
 COINCIDENCES: dict[str, list[Shape]] = {
     "panels flush with facets": panels(),
     "panels flush with a mesh": [*panels(), crumbs()],
@@ -270,6 +279,8 @@ COINCIDENCES: dict[str, list[Shape]] = {
     "lamp of two sides, turned": two_sided_lamp()[::-1],
     "panels that overlap": overlapping_panels(),
     "panels that overlap, turned": overlapping_panels()[::-1],
+    "panels that are cut": cut_panels(),
+    "panels that are cut, in a mesh": [*cut_panels(), crumbs()],
     "a lamp in a sphere's place, among many": spheres_in_a_corner(),
 }
 
@@ -288,6 +299,7 @@ def tilted(shapes: list[Shape]) -> list[Shape]:
     ]
 
 
+@pytest.mark.filterwarnings("ignore:surfaces overlap in one place")
 @pytest.mark.parametrize(
     "name",
     [pytest.param(n, marks=pytest.mark.slow if i else ()) for i, n in enumerate(COINCIDENCES)],

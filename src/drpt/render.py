@@ -214,9 +214,10 @@ class Rendering:
         """The scene on the device, and what it is rendered by."""
         types = backend.load()  # before Dr.Jit is imported, which the kernels do
         from drpt.kernel.launch import make_launcher
+        from drpt.kernel.overlaps import warning_of
 
         settings = self.settings
-        return make_launcher(
+        launcher = make_launcher(
             types,
             settings.scene,
             settings.bounces,
@@ -225,6 +226,9 @@ class Rendering:
             jitter=settings.jitter,
             share_rays=settings.sampler == "sobol" and settings.spp >= SHARING_SPP,
         )
+        if overlaps := launcher.primitives.overlaps:
+            warnings.warn(warning_of(overlaps), RuntimeWarning, stacklevel=2)
+        return launcher
 
     def result(self) -> Result:
         """The picture of the passes that have run.
@@ -438,7 +442,8 @@ def render(  # noqa: PLR0913 -- a setting each
         The same call gives the same bits, if no time limit stops it, whatever the number of threads
         and on every x86-64 CPU with FMA; scenes of so many triangles that Embree meets them were
         measured on one CPU only. Samples that are not finite stay in it, and give a
-        `RuntimeWarning` that says where; a black picture gives one that says why.
+        `RuntimeWarning` that says where; a black picture gives one that says why, and shapes that
+        overlap in one plane one that names them.
 
     Raises
     ------

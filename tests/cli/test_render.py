@@ -703,3 +703,13 @@ def test_the_program_renders_what_the_function_renders() -> None:
     np.testing.assert_array_equal(image, expected.image)
     assert image.any()
     assert (metadata["spp"], metadata["mode"], metadata["seed"]) == (4, "explicit", 3)
+
+
+def test_shapes_that_overlap_give_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = f'[[shapes]]\ntype = "mesh"\n{MESH}\nmaterial = {{ type = "diffuse", albedo = 0.9 }}\n'
+    Path("two.toml").write_text(SCENE + mesh, encoding="utf-8")
+    assert cli.render_main(["two.toml", "--spp", "1", "--quiet", "--explain"]) == 0
+    assert capsys.readouterr().err == (
+        "drpt-render: warning: surfaces overlap in one place, where the later one is seen: "
+        "shapes[2] and shapes[3]\n"
+    )

@@ -143,14 +143,14 @@ def test_what_is_smaller_than_a_pixel_is_not_missed() -> None:
 @pytest.mark.parametrize("above", [0, 1e-7, -1e-7])
 def test_a_lamp_flush_with_a_wall_is_not_hidden(above: float) -> None:
     lamp = quad((-1, -above, -1), (2, 0, 0), (0, 0, 2), radiance=1)
-    facets = known(camera(), [lamp, WALL]) if above else self_or_unknown(lamp)
+    facets = known(camera(), [WALL, lamp]) if above else self_or_unknown(lamp)
     assert facets[SIDE // 2, SIDE // 2] == UNKNOWN
     assert facets[0, 0] == 0
 
 
 def self_or_unknown(lamp: drpt.Mesh) -> NDArray[np.uint32]:
     """As `known`, but the oracle could not tell which one is met."""
-    return covering_facets(camera(), make_primitives((lamp, WALL)))
+    return covering_facets(camera(), make_primitives((WALL, lamp)))
 
 
 def test_a_lamp_behind_a_wall_hides_nothing() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, Delaunay
 
-from drpt.kernel.facets import Facet, bounds, has_area, make_facet, merge_coplanar
+from drpt.kernel.facets import Facet, area_vectors, bounds, has_area, make_facet, merge_coplanar
 from tests.oracle.arrays import dot
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -208,7 +208,7 @@ def test_plane_of_a_facet_holds_its_corners(seed: int) -> None:
 def test_triangles_without_area_are_told() -> None:
     point, line = SQUARE[[0, 0, 0]], np.array([[0.0, 0, 0], [1, 1, 1], [3, 3, 3]])
     thin = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1e-9, 0]])
-    assert has_area(np.array([SQUARE[:3], point, line, thin])).tolist() == [
+    assert has_area(area_vectors(np.array([SQUARE[:3], point, line, thin]))).tolist() == [
         True,
         False,
         False,

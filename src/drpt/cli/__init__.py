@@ -24,7 +24,14 @@ from drpt.cli import (
 )
 from drpt.cli.interrupts import interrupts_raised
 from drpt.cli.parser import Parser, add_version
-from drpt.cli.status import FAILED, INTERRUPTED, drop_stdout, print_anything, say
+from drpt.cli.status import (
+    FAILED,
+    INTERRUPTED,
+    drop_stdout,
+    one_line_warnings,
+    print_anything,
+    say,
+)
 from drpt.kernel import backend
 
 if TYPE_CHECKING:
@@ -61,7 +68,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             print_anything()
             args = _parse(argv)
             program, unread = args.parser.prog, getattr(args, "unread", 0)
-            status: int = args.run(args)
+            with one_line_warnings(program):
+                status: int = args.run(args)
             print(end="", flush=True)
     except KeyboardInterrupt:
         say(f"{program}: interrupted")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-import warnings
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from secrets import token_hex
@@ -35,7 +34,7 @@ from drpt.scene import load_scene
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Generator, Iterator
+    from collections.abc import Generator
 
     from numpy.typing import NDArray
 
@@ -164,7 +163,7 @@ def run(args: argparse.Namespace) -> int:
         backend.set_thread_count(args.threads)
     if args.explain:
         _print(str(explain(rendering.settings.scene, args.bounces, args.mode)))
-    with interrupts_noted() as request, _one_line_warnings(args.parser.prog):
+    with interrupts_noted() as request:
         first_hits = rendering.first_hits() if args.layers or args.denoise else {}
         _run(rendering, request, preview, progress=_on_terminal() and not args.quiet)
         result = _finished(rendering.final_result(), first_hits, args)
@@ -257,14 +256,6 @@ def _save(result: Result, path: Path, args: argparse.Namespace) -> Path | None:
             return kept
     say(f"{args.parser.prog}: the picture is lost: nothing can be written to other folders, either")
     return None
-
-
-@contextmanager
-def _one_line_warnings(program: str) -> Iterator[None]:
-    """Print warnings without the place in the code that they come from."""
-    with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_, **__: say(f"{program}: warning: {message}")
-        yield
 
 
 def _print(*texts: object) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import warnings
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,14 @@ def bad_input(parser: argparse.ArgumentParser) -> Iterator[None]:
         parser.error(f"{error.filename}: {error.strerror}" if named else str(error))
     except (ValueError, ImportError) as error:
         parser.error(str(error))
+
+
+@contextmanager
+def one_line_warnings(program: str) -> Iterator[None]:
+    """Print warnings without the place in the code that they come from."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_, **__: say(f"{program}: warning: {message}")
+        yield
 
 
 def say(line: str) -> None:

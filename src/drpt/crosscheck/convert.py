@@ -8,7 +8,10 @@ import numpy as np
 
 from drpt.crosscheck.phong import NAME as PHONG
 from drpt.crosscheck.variant import load_mitsuba
-from drpt.scene import Mesh, Phong, Sphere
+from drpt.kernel.overlaps import resolve_overlaps
+from drpt.kernel.parts import make_parts, origin_of
+from drpt.scene import Phong, Sphere
+from drpt.scene.meshes import MeshArrays
 
 if TYPE_CHECKING:
     from drpt.scene import Camera, Material, Scene, Shape
@@ -31,6 +34,9 @@ def to_mitsuba(scene: Scene, bounces: int = 3) -> Any:
     - Mitsuba 3.9.1 loses digits in the solid angle of small and far sphere lights: at a radius /
       distance of 0.03 it is off by 1e-4 at the most, at 0.001 by up to 10 %; below 1.7e-4 the light
       is black. `drpt.crosscheck.domain` has a bound.
+    - Of shapes that overlap in one plane Mitsuba gets what is seen: the earlier ones are cut as for
+      drpt's kernels. Where a light is in the plane of an earlier surface that reflects, nothing is
+      cut, and Mitsuba shows one of them, depending on rounding.
 
     Raises
     ------
@@ -53,8 +59,25 @@ def to_mitsuba_dict(scene: Scene, bounces: int = 3) -> dict[str, Any]:
         "type": "scene",
         "integrator": {"type": "path", "max_depth": bounces + 1, "rr_depth": bounces + 2},
         "sensor": _sensor(mi, scene),
-        **{f"shape{i}": _shape(mi, shape) for i, shape in enumerate(scene.shapes)},
+        **_shapes(mi, scene),
     }
+
+
+def _shapes(mi: Any, scene: Scene) -> dict[str, Any]:
+    """Return Mitsuba's shapes by name; what drpt cuts away of overlapping shapes is left out."""
+    origin = origin_of(scene.shapes)
+    parts = resolve_overlaps(make_parts(scene.shapes, origin)).parts
+    shapes = {}
+    for part in parts:
+        if not part.is_cut:
+            shapes[f"shape{part.number}"] = _shape(mi, part.shape)
+        elif len(part.primitives):
+            vertices = part.triangles.reshape(-1, 3) + origin
+            faces = np.arange(len(vertices)).reshape(-1, 3)
+            normals = part.normals.reshape(-1, 3) if len(part.normals) else None
+            arrays = MeshArrays(vertices, faces, normals)
+            shapes[f"shape{part.number}"] = _mesh(mi, part.shape, arrays)
+    return shapes
 
 
 def _sensor(mi: Any, scene: Scene) -> dict[str, Any]:
@@ -101,7 +124,8 @@ def _reach(scene: Scene) -> float:
 def _shape(mi: Any, shape: Shape) -> Any:
     if isinstance(shape, Sphere):
         return {"type": "sphere", "center": shape.center, "radius": shape.radius, **surface(shape)}
-    return _mesh(mi, shape)
+    normals = None if shape.is_light else shape.normals
+    return _mesh(mi, shape, MeshArrays(shape.vertices, shape.faces, normals))
 
 
 def surface(shape: Shape) -> dict[str, Any]:
@@ -112,18 +136,18 @@ def surface(shape: Shape) -> dict[str, Any]:
     return {**bsdf, "emitter": {"type": "area", "radiance": _rgb(shape.radiance)}}
 
 
-def _mesh(mi: Any, mesh: Mesh) -> Any:
+def _mesh(mi: Any, shape: Shape, arrays: MeshArrays) -> Any:
     """Return a mesh of Mitsuba's; a light emits by its geometry's side, not by its normals'."""
     properties = mi.Properties()
-    for name, plugin in surface(mesh).items():
+    for name, plugin in surface(shape).items():
         properties[name] = mi.load_dict(plugin)
-    normals = None if mesh.is_light else mesh.normals
+    vertices, faces, normals = arrays
     properties["face_normals"] = normals is None
-    sizes = len(mesh.vertices), len(mesh.faces)
+    sizes = len(vertices), len(faces)
     copy = mi.Mesh("mesh", *sizes, props=properties, has_vertex_normals=normals is not None)
     buffers = mi.traverse(copy)
-    buffers["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
-    buffers["faces"] = mesh.faces.astype(np.uint32).ravel()
+    buffers["vertex_positions"] = vertices.astype(np.float32).ravel()
+    buffers["faces"] = faces.astype(np.uint32).ravel()
     buffers.update()
     if normals is not None:  # after the update above, which makes normals of its own
         buffers["vertex_normals"] = normals.astype(np.float32).ravel()

@@ -203,10 +203,13 @@ def _loose(primitives: Primitives, solids: tuple[Solid, ...]) -> Iterator[tuple[
 
 
 def _reach(primitives: Primitives, loose: list[int]) -> NDArray[np.float64]:
-    """How far triangles reach whose seams are wider than the rounding of a point on them."""
+    """How far triangles reach whose seams are wider than the rounding of a point on them.
+
+    Pieces of a triangle have seams with others without sharing whole edges with them.
+    """
     reach = np.zeros(len(primitives.facets))
     for numbers in edge_owners([primitives.facets[i].corners for i in loose]).values():
-        if len(numbers) > 1:
+        if len(numbers) > 1 or primitives.is_cut:
             for i in (loose[number] for number in numbers):
                 reach[i] = np.abs(primitives.facets[i].corners).max()
     return np.concatenate([reach, np.abs(primitives.triangles).max(axis=(1, 2), initial=0)])

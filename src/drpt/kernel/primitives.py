@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.facets import COPLANAR, bounds, has_area, make_facet, merge_coplanar
+from drpt.kernel.facets import COPLANAR, area_vectors, bounds, make_facet, merge_coplanar
+from drpt.kernel.overlaps import resolve_overlaps
+from drpt.kernel.parts import NO_TRIANGLES, NO_VECTORS, make_parts, origin_of
 from drpt.kernel.solids import make_solids
 from drpt.kernel.spheres import SphereLayout, lay_out
 from drpt.scene import Diffuse, Mesh, Phong, Sphere
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.facets import Facet
+    from drpt.kernel.overlaps import Overlap
+    from drpt.kernel.parts import Part
     from drpt.kernel.solids import Solid
     from drpt.scene import Shape
 
@@ -71,6 +75,10 @@ class Primitives:
         Of each light (n, 3).
     shape
         Number of each primitive's shape in the scene; of coincident lights, the first's.
+    overlaps
+        The shapes that overlap, of which the earlier ones are cut.
+    is_cut
+        Whether some triangles are pieces of those of a mesh.
     """
 
     origin: Array
@@ -86,6 +94,8 @@ class Primitives:
     reflectance: Array
     radiance: Array
     shape: NDArray[np.intp]
+    overlaps: tuple[Overlap, ...]
+    is_cut: bool
 
     def __post_init__(self) -> None:
         """Make the arrays read-only: renders of the same shapes share them."""
@@ -166,27 +176,31 @@ class Primitives:
 
 def make_primitives(shapes: tuple[Shape, ...]) -> Primitives:
     """Primitives of the shapes of a scene."""
-    origin = _origin(shapes)
-    parts = [_part(number, shape, origin) for number, shape in enumerate(shapes)]
-    dull = [part for part in parts if not part.shape.is_light]
+    origin = origin_of(shapes)
+    parts, overlaps = resolve_overlaps(make_parts(shapes, origin))
+    dull = [part for part in parts if not part.is_light]
     meshes = [part for part in dull if isinstance(part.shape, Mesh)]
     smooth = [part for part in meshes if len(part.normals)]
     spheres = [part for part in dull if isinstance(part.shape, Sphere)]
     flat, facets = _unrolled([part for part in meshes if not len(part.normals)], smooth)
-    lit = [part for part in parts if part.shape.is_light]
+    lit = [part for part in parts if part.is_light]
     lit_spheres = _lights([part for part in lit if isinstance(part.shape, Sphere)], 4)
     lit_triangles = _lights([part for part in lit if isinstance(part.shape, Mesh)], 3, 3)
-    corners = np.concatenate([np.empty((0, 3, 3)), *map(_triangles, (*flat, *smooth))])
+    corners = np.concatenate([NO_TRIANGLES, *map(_triangles, (*flat, *smooth))])
+    vectors = [_area_vectors(part) for part in (*flat, *smooth)]
     light_corners = lit_triangles.primitives
     few_lights = len(light_corners) <= LIGHT_FACET_LIMIT
     return Primitives(
         origin=origin,
-        planes=_planes(np.concatenate([corners, light_corners])),
+        planes=_planes(
+            np.concatenate([corners, light_corners]),
+            np.concatenate([NO_VECTORS, *vectors, area_vectors(light_corners)]),
+        ),
         facets=facets,
         triangles=corners[len(facets) :],
         light_facets=tuple(map(make_facet, light_corners)) if few_lights else (),
         smooth_corners=_joined(smooth, 3, 3),
-        smooth_normals=np.concatenate([np.empty((0, 3, 3)), *(part.normals for part in smooth)]),
+        smooth_normals=np.concatenate([NO_TRIANGLES, *(part.normals for part in smooth)]),
         light_corners=light_corners,
         spheres=np.concatenate([_joined(spheres, 4), lit_spheres.primitives]),
         sphere_lights=len(lit_spheres.primitives),
@@ -195,20 +209,9 @@ def make_primitives(shapes: tuple[Shape, ...]) -> Primitives:
         shape=np.concatenate(
             [_numbers([*flat, *smooth, *spheres]), lit_spheres.shape, lit_triangles.shape]
         ),
+        overlaps=overlaps,
+        is_cut=any(part.is_cut for part in parts),
     )
-
-
-class _Part(NamedTuple):
-    """The primitives of a shape: a sphere's row (1, 4), or a mesh' polygons.
-
-    Polygons are triangles (n, 3, 3), with ``normals`` at their corners where the mesh has some;
-    or a list of outlines (k, 3), once they are merged.
-    """
-
-    number: int
-    shape: Shape
-    primitives: Array | list[Array]
-    normals: Array = np.empty((0, 3, 3))
 
 
 class _Lights(NamedTuple):
@@ -219,17 +222,7 @@ class _Lights(NamedTuple):
     shape: NDArray[np.intp]
 
 
-def _part(number: int, shape: Shape, origin: Array) -> _Part:
-    if isinstance(shape, Sphere):
-        return _Part(number, shape, np.array([[*(shape.center - origin), shape.radius]]))
-    corners = shape.vertices[shape.faces] - origin
-    kept = has_area(corners)
-    if shape.normals is None or shape.is_light:
-        return _Part(number, shape, corners[kept])
-    return _Part(number, shape, corners[kept], shape.normals[shape.faces[kept]])
-
-
-def _unrolled(flat: list[_Part], smooth: list[_Part]) -> tuple[list[_Part], tuple[Facet, ...]]:
+def _unrolled(flat: list[Part], smooth: list[Part]) -> tuple[list[Part], tuple[Facet, ...]]:
     """The flat parts, coplanar triangles merged, and all facets, if those are few enough."""
     if sum(len(part.primitives) for part in (*flat, *smooth)) > MERGE_LIMIT:
         return flat, ()
@@ -240,7 +233,7 @@ def _unrolled(flat: list[_Part], smooth: list[_Part]) -> tuple[list[_Part], tupl
     return merged, tuple(map(make_facet, polygons))
 
 
-def _lights(parts: list[_Part], *shape: int) -> _Lights:
+def _lights(parts: list[Part], *shape: int) -> _Lights:
     """Primitives (n, *shape) that emit; coincident ones are one, with the sum of their radiance."""
     primitives = _joined(parts, *shape)
     radiance = _rows(parts, lambda shape: shape.radiance or (), 3)
@@ -272,50 +265,38 @@ def _reflectance(shape: Shape) -> tuple[float, ...]:
     return (*material.albedo, material.exponent if isinstance(material, Phong) else DIFFUSE)
 
 
-def _joined(parts: list[_Part], *shape: int) -> Array:
+def _joined(parts: list[Part], *shape: int) -> Array:
     """Primitives of all parts, (n, *shape)."""
     return np.concatenate([np.empty((0, *shape)), *(part.primitives for part in parts)])
 
 
-def _triangles(part: _Part) -> Array:
+def _triangles(part: Part) -> Array:
     """A triangle in the plane of each polygon, (n, 3, 3)."""
     if isinstance(part.primitives, list):
         return np.array([outline[:3] for outline in part.primitives]).reshape(-1, 3, 3)
     return part.primitives
 
 
-def _rows(parts: list[_Part], row: Callable[[Shape], tuple[float, ...]], width: int) -> Array:
+def _rows(parts: list[Part], row: Callable[[Shape], tuple[float, ...]], width: int) -> Array:
     """The row of each part's shape, once for each of its primitives, (n, width)."""
     rows = np.array([row(part.shape) for part in parts]).reshape(-1, width)
     return np.repeat(rows, [len(part.primitives) for part in parts], axis=0)
 
 
-def _numbers(parts: list[_Part]) -> NDArray[np.intp]:
+def _numbers(parts: list[Part]) -> NDArray[np.intp]:
     """The number of each part's shape, once for each of its primitives."""
     numbers = np.array([part.number for part in parts], np.intp)
     return np.repeat(numbers, [len(part.primitives) for part in parts])
 
 
-def _planes(corners: Array) -> Array:
-    """Row (normal, offset) of the plane of each triangle (n, 3, 3)."""
-    a, b, c = corners.swapaxes(0, 1)
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.column_stack([normals, np.einsum("ij,ij->i", normals, a)])
+def _area_vectors(part: Part) -> Array:
+    """The area vector of the triangle in the plane of each polygon, (n, 3)."""
+    if isinstance(part.primitives, list):
+        return area_vectors(_triangles(part))
+    return part.area_vectors
 
 
-def _origin(shapes: tuple[Shape, ...]) -> Array:
-    """Centre of the shapes on a grid as coarse as their extent: 0 where they are near enough.
-
-    Relative to it, float32 resolves the shapes however far they stand from the scene's own origin.
-    """
-    spheres = [(*shape.center, shape.radius) for shape in shapes if isinstance(shape, Sphere)]
-    centers, radii = np.split(np.array(spheres).reshape(-1, 4), [3], axis=1)
-    meshes = [shape.vertices for shape in shapes if isinstance(shape, Mesh)]
-    low = np.vstack([centers - radii, *(mesh.min(axis=0) for mesh in meshes)]).min(axis=0)
-    high = np.vstack([centers + radii, *(mesh.max(axis=0) for mesh in meshes)]).max(axis=0)
-    extent = np.linalg.norm(high - low)
-    if extent == 0:
-        return np.asarray(low)
-    grid = 2.0 ** np.ceil(np.log2(extent))
-    return np.asarray(grid * np.round((low + high) / 2 / grid))
+def _planes(corners: Array, vectors: Array) -> Array:
+    """Row (normal, offset) of the plane of each triangle (n, 3, 3), by its area vector (n, 3)."""
+    normals = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.column_stack([normals, np.einsum("ij,ij->i", normals, corners[:, 0])])

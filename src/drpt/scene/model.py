@@ -296,7 +296,8 @@ class Scene:
     camera
         The camera.
     shapes
-        Spheres and meshes, one at least.
+        Spheres and meshes, one at least. Where two of them overlap in one plane, or are the same
+        sphere, the later one is seen, and renders give a `RuntimeWarning` that names both.
     description
         One line for people.
     """

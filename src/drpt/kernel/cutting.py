@@ -1,0 +1,91 @@
+"""Meshes of which the areas that others cover are cut away (host)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from drpt.kernel.clipping import fan, subtract, widen
+from drpt.kernel.coplanar import SAME_PLACE
+from drpt.kernel.facets import area_vectors, has_area, merge_coplanar
+from drpt.kernel.parts import NO_TRIANGLES, Part
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from drpt.kernel.parts import Triangles
+
+    Array: TypeAlias = NDArray[np.float64]
+    Indices: TypeAlias = NDArray[np.intp]
+
+MERGE_LIMIT = 256
+"""Up to this many triangles that overlap are merged into convex polygons before they are cut."""
+DIGITS = 7
+"""Triangles are in one plane where their planes are the same in this many digits: those of
+different sheets differ by more, see `SAME_PLACE`."""
+
+
+def cut_parts(parts: list[Part], triangles: Triangles, pairs: Indices) -> list[Part]:
+    """Parts without the areas of the first of each pair of triangles that the second covers."""
+    cut: dict[int, Part] = {}
+    of_part = triangles.part[pairs[:, 0]]
+    for place, starts in zip(*np.unique(of_part, return_index=True), strict=True):
+        part, stop = triangles.parts[place], np.searchsorted(of_part, place, side="right")
+        cut[part.number] = _cut_part(triangles, part, place, pairs[starts:stop])
+    return [cut.get(part.number, part) for part in parts]
+
+
+def _cut_part(triangles: Triangles, part: Part, place: int, pairs: Indices) -> Part:
+    covered, at = np.unique(pairs[:, 0], return_inverse=True)
+    numbers = covered - triangles.first[place]
+    corners, normals = part.primitives[numbers], part.normals
+    if len(normals) or len(pairs) > MERGE_LIMIT:
+        covers = np.split(pairs[:, 1], np.cumsum(np.bincount(at))[:-1])
+        pieces = [
+            _uncovered(polygon, list(triangles.corners(others)))
+            for polygon, others in zip(corners, covers, strict=True)
+        ]
+    else:
+        pieces = _merged_pieces(triangles, pairs)
+    left = np.delete(np.arange(len(part.primitives)), numbers)
+    if len(normals):
+        mixed = map(_interpolated, corners, normals[numbers], pieces)
+        normals = np.concatenate([normals[left], *mixed])
+    whole = np.concatenate([part.primitives[left], *pieces])
+    vectors = area_vectors(whole)
+    kept = has_area(vectors)
+    normals = normals[kept] if len(normals) else normals
+    return Part(part.number, part.shape, whole[kept], normals, vectors[kept], is_cut=True)
+
+
+def _merged_pieces(triangles: Triangles, pairs: Indices) -> list[Array]:
+    """Triangles (m, 3, 3) that are left of flat ones; those in one plane are cut as polygons."""
+    corners, vectors = triangles.corners(pairs[:, 0]), triangles.vectors[pairs[:, 0]]
+    normals = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    offsets = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.abs(corners).max()
+    rows = np.round(np.column_stack([normals, offsets]), DIGITS)
+    plane = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    pieces = []
+    for k in range(plane.max() + 1):
+        first, second = (np.unique(column) for column in pairs[plane == k].T)
+        covers = merge_coplanar(triangles.corners(second))
+        polygons = merge_coplanar(triangles.corners(first))
+        pieces += [_uncovered(polygon, covers) for polygon in polygons]
+    return pieces
+
+
+def _uncovered(polygon: Array, covers: list[Array]) -> Array:
+    """Triangles (m, 3, 3) that are left of a polygon."""
+    overlap = SAME_PLACE * np.abs(polygon).max()
+    pieces = subtract(polygon, covers, overlap)
+    return np.concatenate([NO_TRIANGLES, *(fan(widen(piece, overlap)) for piece in pieces)])
+
+
+def _interpolated(corners: Array, normals: Array, pieces: Array) -> Array:
+    """Normals at the corners of pieces (m, 3, 3) of a triangle: mixed, and not of unit length."""
+    a, b, c = corners
+    basis = np.stack([b - a, c - a, np.cross(b - a, c - a)], axis=1)
+    weights = np.linalg.solve(basis, (pieces - a).reshape(-1, 3).T).T
+    mixed = normals[0] + weights[:, :2] @ (normals[1:] - normals[0])
+    return np.asarray(mixed.reshape(-1, 3, 3))
