@@ -705,6 +705,7 @@ def test_the_program_renders_what_the_function_renders() -> None:
     assert (metadata["spp"], metadata["mode"], metadata["seed"]) == (4, "explicit", 3)
 
 
+@pytest.mark.filterwarnings("default:surfaces overlap in one place")
 def test_shapes_that_overlap_give_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     mesh = f'[[shapes]]\ntype = "mesh"\n{MESH}\nmaterial = {{ type = "diffuse", albedo = 0.9 }}\n'
     Path("two.toml").write_text(SCENE + mesh, encoding="utf-8")
