@@ -80,7 +80,7 @@ def test_lights_reflect_nothing(mi: Any) -> None:
     shapes: list[Shape] = [
         LIGHT,
         Mesh(TRIANGLE, FACES, radiance=1),
-        Sphere((0, 0, 0), 1, radiance=0),
+        Sphere((3, 0, 0), 1, radiance=0),
     ]
     copies = to_mitsuba(Scene(camera(), shapes)).shapes()
     assert [copy.is_emitter() for copy in copies] == [True, True, False]
