@@ -45,25 +45,31 @@ def to_mitsuba(scene: Scene, bounces: int = 3) -> Any:
     drpt.kernel.backend.BackendError
         No usable libLLVM was found.
     """
-    return load_mitsuba().load_dict(to_mitsuba_dict(scene, bounces))
+    mi = load_mitsuba()
+    return mi.load_dict({**_settings(mi, scene, bounces), **_seen_shapes(mi, scene)})
 
 
 def to_mitsuba_dict(scene: Scene, bounces: int = 3) -> dict[str, Any]:
     """Return the dict that Mitsuba loads the scene from; meshes are in it as Mitsuba's objects.
 
     See :func:`to_mitsuba`. Phong surfaces are of the type ``drpt_phong``, which is registered in
-    the variant that is set.
+    the variant that is set. Shapes are whole, also where they overlap in one plane.
     """
     mi = load_mitsuba()
+    shapes = {f"shape{i}": _shape(mi, shape) for i, shape in enumerate(scene.shapes)}
+    return {**_settings(mi, scene, bounces), **shapes}
+
+
+def _settings(mi: Any, scene: Scene, bounces: int) -> dict[str, Any]:
+    """Return all of a scene but its shapes."""
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": bounces + 1, "rr_depth": bounces + 2},
         "sensor": _sensor(mi, scene),
-        **_shapes(mi, scene),
     }
 
 
-def _shapes(mi: Any, scene: Scene) -> dict[str, Any]:
+def _seen_shapes(mi: Any, scene: Scene) -> dict[str, Any]:
     """Return Mitsuba's shapes by name; what drpt cuts away of overlapping shapes is left out."""
     origin = origin_of(scene.shapes)
     parts = resolve_overlaps(make_parts(scene.shapes, origin)).parts

@@ -60,7 +60,7 @@ def _write(mi: Any, scene: Scene, path: Path, bounces: int) -> None:
     folder = path.with_name(f"{path.stem}-meshes")
     table = to_mitsuba_dict(scene, bounces)
     for index, shape in enumerate(scene.shapes):
-        if isinstance(shape, Mesh) and f"shape{index}" in table:  # not hidden by a later one
+        if isinstance(shape, Mesh):
             file = _write_ply(mi, table[f"shape{index}"], folder)
             table[f"shape{index}"] = _ply(shape, file.relative_to(path.parent))
     table["sensor"]["sampler"]["sample_count"] = SPP
