@@ -11,7 +11,7 @@ import pytest
 
 import drpt
 from drpt.convergence import INDEPENDENT
-from drpt.error import DARK, relative_mse, squared_differences
+from drpt.error import DARK, Estimate, relative_mse, squared_differences
 from drpt.error import estimate as estimated
 from drpt.film import Film
 from tests.scenes import LAMP_AND_BALL, seen_by
@@ -170,6 +170,23 @@ def test_errors_grow_with_the_radiance(radiance: float) -> None:
     assert np.sqrt(np.mean(scaled**2)) / radiance == pytest.approx(
         np.sqrt(np.mean(plain**2)), rel=VARIANCE
     )
+
+
+class TestBound:
+    def of(self, squares: Floats) -> Estimate:
+        """Of a grey picture with such squared differences, of independent samples."""
+        levels = np.stack([squares, squares]).astype(np.float32)
+        return Estimate(levels, np.ones_like(squares), 1.0, independent=True)
+
+    def test_many_pixels_are_certain(self) -> None:
+        found = self.of(np.random.default_rng(0).chisquare(3, (SIDE, SIDE, 3)))
+        assert found.bound == found.relative_mse
+
+    def test_a_pixel_that_holds_half_of_the_error_is_not(self) -> None:
+        squares = np.ones((16, 16, 3))
+        squares[3, 4] = 16**2
+        found = self.of(squares)
+        assert found.bound > 1.2 * found.relative_mse
 
 
 class TestRelativeMse:

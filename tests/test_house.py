@@ -27,6 +27,7 @@ KNOWS: dict[str, set[str]] = {
     "convergence": set(),
     "pooling": set(),
     "error": {"convergence", "pooling"},
+    "missed": {"error", "scene"},
     "output": {"files", "machine", "messages"},
     "plan": set(),
     "denoise": {"distribution"},

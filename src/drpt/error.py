@@ -38,6 +38,13 @@ DARK = 0.01
 """Added to squares of radiance, so that dark pixels do not decide about relMSE."""
 AT_ONCE = 2**14
 """Pixels whose blocks and their differences stay in the cache: new memory takes longest."""
+DEVIATIONS = 3
+"""Standard deviations to the bound of a relMSE. Squares of one pixel's error have a long tail."""
+SCATTER = 1.6
+"""Variance of the squared error of a pixel and of its estimate, over the mean square of estimates.
+
+The former is 2 e⁴ and 2/3 e⁴, as the estimate has three degrees of freedom, the latter 5/3 e⁴.
+"""
 TINY = np.finfo(np.float64).tiny
 WINDOW = 5
 """Pixels along the sides of the squares in which noise is averaged, for `_weights`."""
@@ -135,6 +142,17 @@ class Estimate:
     def relative_mse(self) -> float:
         """Estimated relMSE of the image; not a number if unknown."""
         return float(np.mean(self.relative_squares))
+
+    @cached_property
+    def bound(self) -> float:
+        """Half of the relMSE that the image does not exceed, but for a few in a hundred pictures.
+
+        It is no less than `relative_mse`, and larger where few pixels hold most of the error: then
+        they may have been estimated too low, and what is left of their noise is not averaged out.
+        """
+        shares = self.relative_squares.mean(axis=2) / self.relative_squares[..., 0].size
+        scatter = DEVIATIONS * np.sqrt(SCATTER * np.sum(np.square(shares)))
+        return float(max(self.relative_mse, (self.relative_mse + scatter) / 2))
 
     @cached_property
     def _levels(self) -> list[Array]:

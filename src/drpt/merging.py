@@ -211,7 +211,7 @@ def _joined(name: str, values: list[Any]) -> Any:
     """One value for those that two renders have; there may be a single one."""
     if name in SUMMED:
         return sum(values)
-    if name == "partial":
+    if name in ("partial", "error_uncertain"):
         return any(values)
     if all(value == values[0] for value in values):
         return values[0]

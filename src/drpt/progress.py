@@ -44,7 +44,8 @@ def with_bar(
             speed = settings.pixels * (spp - before) / seconds / 1e6
             bar.update(task, completed=spp, speed=speed)
             if not hidden and spp >= GROWTH * looked:
-                looked, error = spp, rendering.result().error
-                total = rendering.expected_spp(seconds / (spp - before), error)
+                looked, result = spp, rendering.result()
+                error = result.error
+                total = rendering.expected_spp(seconds / (spp - before), result.error_bound)
                 bar.update(task, error=f"relMSE {error:.1e}", total=total)
             yield spp

@@ -22,6 +22,7 @@ from drpt.film import Film
 from drpt.immutable import immutable
 from drpt.kernel import backend
 from drpt.kernel.estimator import SHARING_SPP, Mode, feature_facts, layout_facts
+from drpt.missed import missed
 from drpt.plan import parts, plan_passes, run_length
 from drpt.progress import with_bar
 from drpt.result import SAMPLES, Result
@@ -52,6 +53,8 @@ __all__ = [
 
 PACKAGES = ("drjit", "mitsuba", "numpy")
 """Those that a picture's bits come from, beside drpt itself."""
+OTHER_SEED = 2**32
+"""Added to the seed, it gives other noise."""
 FIRST_HIT_SPP = 64
 """Samples after which layers of first hits are as smooth as edges in 8 bits."""
 
@@ -129,19 +132,48 @@ class Rendering:
             launcher = self.launcher
         growing = self._stopping.may_come
         plan = plan_passes(settings.pixels, settings.spp, self.spp, growing=growing, paths=paths)
-        self._enough = self.spp > 0 and self._stopping.has_come(
-            self.spp, lambda: self.result().error
-        )
+        self._enough = self.spp > 0 and self._stopping.has_come(self.spp, self._stopping_error)
         for samples in plan:
             if self._enough:
                 break
             self._run(launcher, samples)
-            self._enough = self._stopping.has_come(self.spp, lambda: self.result().error)
+            self._enough = self._stopping.has_come(self.spp, self._stopping_error)
             self._seconds += perf_counter() - start
             if self._checkpoint and self._checkpoint.is_due():
                 self._save()
             yield self.spp
             start = perf_counter()
+
+    def _stopping_error(self) -> float:
+        """The error that stopping goes by; missed light is looked for once all else is enough."""
+        result = self.result()
+        if not self._stopping.is_enough(result.error_bound):
+            return result.error_bound
+        return result.error_bound + self._missed_light(result)
+
+    def _missed_light(self, result: Result) -> float:
+        """What light that is seen directly, but was missed, adds to the relMSE."""
+        settings = self.settings
+        with backend.interrupts_put_off():
+            lights = self._new_launcher(0)
+            from drpt.kernel.camera import picture_plane
+
+        camera = settings.scene.camera
+        plane = picture_plane(camera)
+
+        def emission(pixels: range, rays: int) -> NDArray[np.float64]:
+            with backend.interrupts_put_off():
+                run = run_length(len(pixels), range(rays), lights.paths_per_ray)
+                sums = lights.launch(pixels, range(rays), run, settings.seed + OTHER_SEED)
+            return np.asarray(sums.radiance.sum(axis=0) / rays)
+
+        return missed(
+            settings.scene,
+            result.image.astype(np.float64),
+            self.spp,
+            lambda points: plane.project(points - np.asarray(camera.eye)),
+            emission,
+        )
 
     def _run(self, launcher: Launcher, samples: range) -> None:
         """Run a pass, or what is left of it."""
@@ -212,6 +244,9 @@ class Rendering:
     @cached_property
     def launcher(self) -> Launcher:
         """The scene on the device, and what it is rendered by."""
+        return self._new_launcher(self.settings.bounces)
+
+    def _new_launcher(self, bounces: int) -> Launcher:
         types = backend.load()  # before Dr.Jit is imported, which the kernels do
         from drpt.kernel.launch import make_launcher
         from drpt.kernel.overlaps import warning_of
@@ -220,7 +255,7 @@ class Rendering:
         launcher = make_launcher(
             types,
             settings.scene,
-            settings.bounces,
+            bounces,
             Mode(settings.mode),
             settings.sampler,
             jitter=settings.jitter,
@@ -239,7 +274,7 @@ class Rendering:
         shape = camera.height, camera.width, 3
         blocks = film.leading_blocks
         settings: dict[str, Any] = {**vars(self.settings), "spp": self.spp}
-        return Result(
+        result = Result(
             image=film.mean.astype(np.float32).reshape(shape),
             **settings,
             partial=self.spp < self.settings.spp and not self._enough,
@@ -252,6 +287,10 @@ class Rendering:
             _differences=squared_differences(blocks, film.size).reshape(-1, *shape),
             _growth=film.samples / (len(blocks) * film.size) if len(blocks) else 1.0,
         )
+        looked, error = self._stopping.last_look or (0, 0.0)
+        if looked != self.spp or not error > result.error_bound:
+            return result
+        return replace(result, _missed=error - result.error_bound)
 
     def first_hits(self) -> dict[str, NDArray[np.float32]]:
         """Layers ``albedo``, ``normal`` and ``depth`` of what the camera sees first.

@@ -80,6 +80,7 @@ class Result(Immutable):
     denoised: bool = False
     _differences: NDArray[np.float32] | None = None
     _growth: float = 1.0
+    _missed: float = 0.0
 
     @property
     def paths(self) -> int:
@@ -99,6 +100,22 @@ class Result(Immutable):
     def error(self) -> float:
         """Estimated relMSE of the image, mean (x − truth)² / (truth² + 0.01)."""
         return self._estimate.relative_mse
+
+    @cached_property
+    def error_bound(self) -> float:
+        """Half of a relMSE that the image hardly exceeds; ``target_error`` stops by it.
+
+        It equals ``error`` where many pixels hold it.
+        """
+        return self._estimate.bound + self._missed
+
+    @property
+    def error_uncertain(self) -> bool:
+        """Whether the true relMSE may well be more than twice ``error``.
+
+        A few pixels hold most of it, or light that is seen directly has been missed.
+        """
+        return bool(self.error_bound > self.error)
 
     @cached_property
     def _estimate(self) -> Estimate:
@@ -126,6 +143,8 @@ class Result(Immutable):
             settings["first_non_finite"] = "{} {} {}".format(*self.first_non_finite)
         if np.isfinite(self.error):
             settings["error"] = self.error
+        if self.error_uncertain:
+            settings["error_uncertain"] = True
         found = versions("drjit", "numpy")
         return {**settings, "mode": str(self.mode), **found, "scene": to_toml(self.scene)}
 
@@ -155,7 +174,11 @@ class Result(Immutable):
             f"{self.seconds:.2f} s",
             f"relMSE {self.error:.2g}" if np.isfinite(self.error) else "relMSE unknown",
         ]
-        marks = {"partial": self.partial, "denoised (biased)": self.denoised}
+        marks = {
+            "error uncertain": self.error_uncertain,
+            "partial": self.partial,
+            "denoised (biased)": self.denoised,
+        }
         return ", ".join([*facts, *(mark for mark, holds in marks.items() if holds)])
 
     def __repr__(self) -> str:

@@ -56,7 +56,11 @@ class Stopping:
         if self._target is None or spp < self._next_look(self._target):
             return False
         self.last_look = spp, error()
-        return self.last_look[1] <= self._target
+        return self.is_enough(self.last_look[1])
+
+    def is_enough(self, error: float) -> bool:
+        """Whether an error is small enough."""
+        return self._target is not None and error <= self._target
 
     def expected_spp(self, spp: int, seconds: float, error: float) -> float:
         """About after how many samples it stops, given the seconds of one and the error of ``spp``.

@@ -279,7 +279,7 @@ def _summary(result: Result, name: str) -> str:
         f"{result.seconds:.2f} s",
         f"{result.paths / mega:.1f} Mpaths/s",
         f"{result.rays / mega:.1f} Mrays/s",
-        f"relMSE about {result.error:.1e}",
+        f"relMSE about {result.error:.1e}{' (uncertain)' if result.error_uncertain else ''}",
     )
     known = speed if np.isfinite(result.error) else speed[:-1]
     return "\n".join(("  ".join(what), "  ".join(known)))

@@ -1,0 +1,74 @@
+"""Light that is seen directly, but that a picture has missed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import drpt
+from drpt.kernel.camera import picture_plane
+from drpt.missed import FACTOR, before_lights, missed
+
+if TYPE_CHECKING:
+    from tests.oracle.arrays import Floats
+
+SIDE = 16
+CAMERA = drpt.Camera((0, 0, 10), (0, 0, 0), (0, 1, 0), 20, SIDE, SIDE)
+PIXEL = 2 * np.tan(np.radians(10)) / SIDE * 10  # width of a pixel 10 away
+LAMP = drpt.Sphere((PIXEL / 2, PIXEL / 2, 0), 0.1 * PIXEL, radiance=100)
+LAMP_PIXEL = SIDE // 2 - 1, SIDE // 2
+
+
+def project(points: Floats) -> Floats:
+    return picture_plane(CAMERA).project(points - np.asarray(CAMERA.eye))
+
+
+def test_a_lamp_is_found_in_its_pixel() -> None:
+    mask = before_lights(drpt.Scene(CAMERA, [LAMP]), project)
+    assert np.argwhere(mask).tolist() == [list(LAMP_PIXEL)]
+
+
+def test_a_triangle_is_found_where_it_is() -> None:
+    corners = np.array([[0.1, 0.1, 0], [2.9, 0.1, 0], [0.1, 1.9, 0]]) * PIXEL
+    light = drpt.Mesh(corners, [[0, 1, 2]], radiance=1)
+    mask = before_lights(drpt.Scene(CAMERA, [light]), project)
+    assert np.argwhere(mask).tolist() == [[y, x] for y in (6, 7) for x in (8, 9, 10)]
+
+
+def test_a_light_around_the_eye_may_be_anywhere() -> None:
+    light = drpt.Sphere((0, 0, 10), 1, radiance=1)
+    assert before_lights(drpt.Scene(CAMERA, [light]), project).all()
+
+
+def test_a_light_out_of_view_is_nowhere() -> None:
+    light = drpt.Sphere((-50, 50, 0), 1, radiance=1)
+    assert not before_lights(drpt.Scene(CAMERA, [light]), project).any()
+
+
+@pytest.mark.parametrize(("value", "share"), [(0.0, 1.0), (1.5, 0.25), (3.0, 0.0), (9.0, 0.0)])
+def test_what_is_lacking_counts_relative_to_what_there_is(value: float, share: float) -> None:
+    """Emission is 3, and a picture has less of it, or more with light from elsewhere."""
+    asked = []
+
+    def seen(pixels: range, rays: int) -> Floats:
+        asked.append((pixels, rays))
+        return np.full((len(pixels), 3), 3.0)
+
+    image = np.zeros((SIDE, SIDE, 3))
+    image[LAMP_PIXEL] = value
+    found = missed(drpt.Scene(CAMERA, [LAMP]), image, 32, project, seen)
+    assert found == pytest.approx(share * 9 / 9.01 / SIDE**2)
+    pixel = LAMP_PIXEL[0] * SIDE + LAMP_PIXEL[1]
+    assert asked == [(range(pixel, pixel + 1), FACTOR * 32)]
+
+
+def test_a_render_does_not_stop_before_it_has_seen_the_lamp() -> None:
+    """It covers a thousandth of one pixel; all else is black, without noise."""
+    lamp = drpt.Sphere(LAMP.center, 0.018 * PIXEL, radiance=1000)
+    result = drpt.render(drpt.Scene(CAMERA, [lamp]), 512, 0, seed=1, target_error=1e-4)
+    assert result.spp == 512
+    assert result.error_uncertain
+    assert "error uncertain" in str(result)
+    assert result.metadata["error_uncertain"] is True
