@@ -85,7 +85,8 @@ def test_a_target_needs_an_error() -> None:
 
 
 @pytest.mark.parametrize("sampler", ["sobol", "independent"])
-def test_a_render_stops_in_the_pass_in_which_its_error_is_small_enough(sampler: str) -> None:
+def test_a_render_stops_as_soon_as_its_error_is_small_enough(sampler: str) -> None:
+    """Or a pass later, where the lamp's edge was missed."""
     target, most = 3e-4, 2**16
     passes = drpt.Rendering(
         LAMP_AND_BALL, most, 2, sampler=sampler, target_error=1e-30, time_limit=1e9
@@ -97,9 +98,9 @@ def test_a_render_stops_in_the_pass_in_which_its_error_is_small_enough(sampler: 
             break
     result = drpt.render(LAMP_AND_BALL, most, 2, sampler=sampler, target_error=target)
     assert 64 < result.spp < most
-    assert result.spp == max(errors)
-    assert result.error <= result.error_bound == errors[result.spp] <= target
-    assert all(error > target for spp, error in errors.items() if 64 <= spp < result.spp)
+    assert result.spp in (max(errors), 2 * max(errors))
+    assert result.error <= result.error_bound <= target
+    assert all(error > target for spp, error in errors.items() if 64 <= spp < max(errors))
     assert not result.partial
 
 
