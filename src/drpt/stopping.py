@@ -55,6 +55,8 @@ class Stopping:
             return True
         if self._target is None or spp < self._next_look(self._target):
             return False
+        if self.last_look and self.last_look[0] == spp:  # of a render that was resumed
+            return self.is_enough(self.last_look[1])
         self.last_look = spp, error()
         return self.is_enough(self.last_look[1])
 
