@@ -562,7 +562,11 @@ def explain(scene: Scene, bounces: int = 3, mode: str = Mode.MIS) -> Explanation
         launcher = rendering.launcher
         operations = launcher.operations()
     what = launcher.primitives, bounces, Mode(rendering.settings.mode)
-    facts = {**feature_facts(*what), **layout_facts(*what)}
+    worthwhile = launcher.tracer.guide is not None
+    facts = {
+        **feature_facts(*what, worthwhile=worthwhile),
+        **layout_facts(*what, worthwhile=worthwhile),
+    }
     return Explanation(
         features={name: fact.holds for name, fact in facts.items()},
         reasons={name: fact.reason for name, fact in facts.items()},

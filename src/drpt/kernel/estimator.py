@@ -6,6 +6,9 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+import numpy as np
+
+from drpt.kernel.facets import area_normal
 from drpt.kernel.primitives import FACET_LIMIT, LIGHT_FACET_LIMIT
 
 if TYPE_CHECKING:
@@ -16,6 +19,9 @@ if TYPE_CHECKING:
 
 REGENERATION_BOUNCES = 3
 """From so many bounces on, lanes would wait for their neighbours long enough."""
+SMALL_LAMP = 1 / 16
+"""Area of a sphere that emits relative to that of all facets: in a convex room, so many of the
+paths run into it. More of them had better count its light."""
 SHARING_SPP = 64
 """With so many samples per pixel, edges are smooth even if a few share a camera ray."""
 
@@ -104,9 +110,14 @@ class Features:
     shared_rays: bool
 
     @classmethod
-    def of(cls, primitives: Primitives, bounces: int, mode: Mode) -> Features:
-        """Features of a kernel for these primitives, this many bounces and this mode."""
-        facts = feature_facts(primitives, bounces, mode)
+    def of(
+        cls, primitives: Primitives, bounces: int, mode: Mode, *, worthwhile: bool = True
+    ) -> Features:
+        """Features of a kernel for these primitives, this many bounces and this mode.
+
+        ``worthwhile`` tells whether a guide is expected to bring less noise.
+        """
+        facts = feature_facts(primitives, bounces, mode, worthwhile=worthwhile)
         return cls(**{field.name: facts[field.name].holds for field in fields(cls)})
 
 
@@ -117,16 +128,21 @@ class Fact(NamedTuple):
     reason: str
 
 
-def feature_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+def feature_facts(
+    primitives: Primitives, bounces: int, mode: Mode, *, worthwhile: bool = True
+) -> dict[str, Fact]:
     """Decide each of the `Features` of a kernel."""
+    guiding = _guiding(primitives, bounces, mode, worthwhile=worthwhile)
     return {
         **_shape_facts(primitives, bounces),
-        **_light_facts(primitives, bounces, mode),
+        **_light_facts(primitives, bounces, mode, guiding),
         **_order_facts(primitives, bounces, mode),
     }
 
 
-def layout_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+def layout_facts(
+    primitives: Primitives, bounces: int, mode: Mode, *, worthwhile: bool = True
+) -> dict[str, Fact]:
     """Say how the primitives lie in a kernel, and which of them its rays look for.
 
     ``merged_triangles``
@@ -140,10 +156,11 @@ def layout_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, 
     ``last_ray``
         The ray after the last bounce, which can but run into a light.
     """
+    guiding = _guiding(primitives, bounces, mode, worthwhile=worthwhile)
     return {
         **_facet_facts(primitives),
         **_hierarchy_facts(primitives),
-        **_ray_facts(primitives, bounces, mode),
+        **_ray_facts(primitives, bounces, mode, guiding),
     }
 
 
@@ -160,7 +177,9 @@ def _shape_facts(primitives: Primitives, bounces: int) -> dict[str, Fact]:
     }
 
 
-def _light_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+def _light_facts(
+    primitives: Primitives, bounces: int, mode: Mode, guiding: Fact
+) -> dict[str, Fact]:
     sampling = _sampling(primitives, bounces, mode)
     lights, spheres = len(primitives.radiance), primitives.sphere_lights
     choice = f"one of {lights} lights at every vertex"
@@ -171,16 +190,22 @@ def _light_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, 
         "light_choice": _decide(choice, *sampling, (lights > 1, "there is one light")),
         "sphere_light_samples": _some(spheres, "sphere light", *sampling),
         "triangle_light_samples": _some(lights - spheres, "triangle light", *sampling),
-        "mis": _decide(both, *sampling, _hits_count(primitives, mode)),
-        "guiding": _decide(
-            f"mode {mode} goes where patches reflect much light",
-            *sampling,
-            (mode is Mode.GUIDED, f"mode {mode} follows the BRDF"),
-            (bounces > 1, "1 bounce: nothing comes after the direct light"),
-            (len(primitives.facets) > 0, "there are no facets, which alone have patches"),
-            (bool(primitives.diffuse[: len(primitives.facets)].any()), "no facet is diffuse"),
-        ),
+        "mis": _decide(both, *sampling, _hits_count(primitives, mode, guiding)),
+        "guiding": guiding,
     }
+
+
+def _guiding(primitives: Primitives, bounces: int, mode: Mode, *, worthwhile: bool) -> Fact:
+    """Decide whether directions are guided."""
+    return _decide(
+        f"mode {mode} goes where patches reflect much light",
+        *_sampling(primitives, bounces, mode),
+        (mode is Mode.GUIDED, f"mode {mode} follows the BRDF"),
+        (bounces > 1, "1 bounce: nothing comes after the direct light"),
+        (len(primitives.facets) > 0, "there are no facets, which alone have patches"),
+        (bool(primitives.diffuse[: len(primitives.facets)].any()), "no facet is diffuse"),
+        (worthwhile, "the noise is not expected to become less"),
+    )
 
 
 def _order_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
@@ -263,7 +288,7 @@ def _sphere_facts(primitives: Primitives) -> dict[str, Fact]:
     }
 
 
-def _ray_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fact]:
+def _ray_facts(primitives: Primitives, bounces: int, mode: Mode, guiding: Fact) -> dict[str, Fact]:
     facets, blockers = len(primitives.facets), sum(primitives.blockers())
     return {
         "facet_shadows": _decide(
@@ -274,7 +299,7 @@ def _ray_facts(primitives: Primitives, bounces: int, mode: Mode) -> dict[str, Fa
         "last_ray": _decide(
             f"mode {mode} counts the light that it runs into",
             *_reflecting(primitives, bounces),
-            _hits_count(primitives, mode),
+            _hits_count(primitives, mode, guiding),
         ),
     }
 
@@ -298,14 +323,28 @@ def _sampling(primitives: Primitives, bounces: int, mode: Mode) -> tuple[Need, .
     )
 
 
-def _hits_count(primitives: Primitives, mode: Mode) -> Need:
+def _hits_count(primitives: Primitives, mode: Mode, guiding: Fact) -> Need:
     """What makes a path that runs into a light after a bounce collect its radiance."""
-    if mode is Mode.GUIDED:
-        sphere = len(primitives.radiance) == primitives.sphere_lights == 1
+    if guiding.holds:
         otherwise = "light samples of one sphere have all of its light on diffuse surfaces"
-        return not (sphere and primitives.diffuse.all()), otherwise
-    counts = mode in (Mode.IMPLICIT_UNIFORM, Mode.IMPLICIT, Mode.MIS)
+        return not (has_small_lamp(primitives) and primitives.diffuse.all()), otherwise
+    counts = mode in (Mode.IMPLICIT_UNIFORM, Mode.IMPLICIT, Mode.MIS, Mode.GUIDED)
     return counts, f"mode {mode} counts no light that it runs into"
+
+
+def knows_all(primitives: Primitives) -> bool:
+    """Whether a guide knows all that reflects direct light, and little of it has noise."""
+    facets = primitives.diffuse[: len(primitives.facets)]
+    only_facets = len(facets) == len(primitives.diffuse)
+    return has_small_lamp(primitives) and only_facets and bool(facets.all())
+
+
+def has_small_lamp(primitives: Primitives) -> bool:
+    """Whether one sphere alone emits, and few paths from facets run into it."""
+    if not len(primitives.radiance) == primitives.sphere_lights == 1:
+        return False
+    facets = sum(float(np.linalg.norm(area_normal(f.corners))) for f in primitives.facets)
+    return bool(primitives.light_areas()[0] <= SMALL_LAMP * facets)
 
 
 def _decide(reason: str, *needs: Need) -> Fact:

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-GUIDED = 0.5
-"""Share of the directions that lead to patches."""
 SLOTS = 1024
 """A patch's chance to be chosen is a multiple of 1 / this, so that it is exact."""
 NOWHERE = 0xFFFFFFFF

@@ -13,11 +13,14 @@ from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import DeviceCamera, make_camera
 from drpt.kernel.compiled import COMPILED
 from drpt.kernel.coverage import covering_facets
-from drpt.kernel.device_scene import DeviceScene, upload
-from drpt.kernel.estimator import Features
+from drpt.kernel.device_scene import DeviceScene, to_device, upload
+from drpt.kernel.estimator import Features, knows_all
+from drpt.kernel.guide_share import GuideShares, make_shares, rounded
 from drpt.kernel.kept import Kept
 from drpt.kernel.learning import learn
+from drpt.kernel.patches import make_patches
 from drpt.kernel.path import Tracer
+from drpt.kernel.pilot import BOUNCES, Pilot, best_shares, fly
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SAMPLERS, SobolSampler
 from drpt.kernel.schedule import Lanes, Totals, Work
@@ -187,11 +190,12 @@ def make_launcher(
     the same without.
     """
     primitives, device_scene = prepare(scene.shapes, types)
-    features = Features.of(primitives, bounces, mode)
+    shares = guide_shares(scene, bounces, mode, types)
+    features = Features.of(primitives, bounces, mode, worthwhile=shares is not None)
     if not (features.diffuse or features.phong):
         bounces = 0
-    guide = learned(scene.shapes, types) if features.guiding else None
-    tracer = Tracer(device_scene, features, mode, bounces, guide=guide)
+    guide = learned(scene.shapes, types) if shares else None
+    tracer = Tracer(device_scene, features, mode, bounces, guide=guide, shares=shares)
     camera = make_camera(scene.camera, primitives.origin, device_scene.types)
     paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
     covering = covered(scene.camera, scene.shapes, types) if features.covered_pixels else None
@@ -213,6 +217,27 @@ def learned(shapes: tuple[Shape, ...], types: ModuleType) -> Guide:
     return learn(*prepare(shapes, types))
 
 
+def guide_shares(scene: Scene, bounces: int, mode: Mode, types: ModuleType) -> GuideShares | None:
+    """Shares of the directions that are guided; None where a guide is not worthwhile."""
+    primitives, device_scene = prepare(scene.shapes, types)
+    if not Features.of(primitives, bounces, mode).guiding:
+        return None
+    shares: NDArray[np.float64] | None
+    shares = rounded(make_shares(primitives, make_patches(primitives.facets), bounces))
+    if not knows_all(primitives):
+        pilot = piloted(scene.camera, scene.shapes, types, min(bounces, BOUNCES))
+        shares = best_shares(pilot, shares, bounces)
+    if shares is None:
+        return None
+    return GuideShares(to_device(shares, device_scene.types), shares.shape[1])
+
+
+@Kept
+def piloted(camera: Camera, shapes: tuple[Shape, ...], types: ModuleType, bounces: int) -> Pilot:
+    """Paths that tell what a guide brings: kept like it, for the same camera."""
+    return fly(*prepare(shapes, types), camera, learned(shapes, types), bounces)
+
+
 @Kept
 def covered(camera: Camera, shapes: tuple[Shape, ...], types: ModuleType) -> UInt32:
     """Numbers of the facets that fill pixels: kept for the next render by the same camera."""
@@ -223,7 +248,7 @@ def covered(camera: Camera, shapes: tuple[Shape, ...], types: ModuleType) -> UIn
 
 def forget() -> None:
     """Forget all that is kept for the next render."""
-    for kept in (prepare, learned, covered):
+    for kept in (prepare, learned, piloted, covered):
         kept.forget()
 
 

@@ -25,7 +25,7 @@ import drjit as dr
 
 from drpt.kernel.brdf import Brdf, make_brdf
 from drpt.kernel.camera import Ray
-from drpt.kernel.guide import GUIDED, NOWHERE
+from drpt.kernel.guide import NOWHERE
 from drpt.kernel.intersect import Hit, Known, closest_hit, light_hit, occluded
 from drpt.kernel.light import (
     LightSample,
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features, Mode
     from drpt.kernel.guide import Guide
+    from drpt.kernel.guide_share import GuideShares
     from drpt.kernel.sampler import Sampler
 
 
@@ -73,6 +74,7 @@ class Vertex(NamedTuple):
     hit: Hit
     brdf: Brdf
     patch: UInt32  # of the guide; 0 where nothing is guided
+    share: Any = 0  # of the directions from here that the guide chooses
 
 
 class Turn(NamedTuple):
@@ -97,6 +99,7 @@ class Tracer:
     mode: Mode
     bounces: int
     guide: Guide | None = field(default=None, kw_only=True)
+    shares: GuideShares | None = field(default=None, kw_only=True)
 
     def first_vertex(self, ray: Ray, sampler: Sampler, known: Known | None = None) -> Vertex:
         """What camera rays meet, which may be known, and the light that it sends."""
@@ -178,7 +181,9 @@ class Tracer:
         brdf = make_brdf(features, hit, -path.direction)
         # After the last bounce there is but light, which a guide knows nothing of.
         guided = brdf.is_diffuse & (depth + 1 < self.bounces)
-        vertex = Vertex(path, hit, brdf, dr.select(guided, patch, type(patch)(0)))
+        patch = dr.select(guided, patch, type(patch)(0))
+        share = self._share(patch, self.bounces - 1 - depth)
+        vertex = Vertex(path, hit, brdf, patch, share)
         if features.direct_light and reflects is not False:
             light, traced = self._direct(vertex, sampler, depth)
             radiance = radiance + path.beta * light
@@ -197,12 +202,15 @@ class Tracer:
         patch = self.guide.patch_of(hit)
         if is_first is True:
             return path, hit, patch
-        return *self._weigh(path, hit, patch, self.guide), patch
+        return *self._weigh(path, hit, patch, depth, self.guide), patch
 
-    def _weigh(self, path: Path, hit: Hit, patch: UInt32, guide: Guide) -> tuple[Path, Hit]:
+    def _weigh(
+        self, path: Path, hit: Hit, patch: UInt32, depth: Any, guide: Guide
+    ) -> tuple[Path, Hit]:
         """Weigh both ways to choose a direction; what has missed its aim is lost."""
         lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
-        by_guide = GUIDED * guide.density(path.patch, patch) * dr.square(hit.distance)
+        density = self._share(path.patch, self.bounces - depth) * guide.density(path.patch, patch)
+        by_guide = density * dr.square(hit.distance)
         by_brdf = path.pdf * dr.abs(dr.dot(hit.normal, path.direction))
         weight = dr.select(by_guide > 0, by_brdf / (by_brdf + by_guide), 1)
         beta = path.beta * dr.select(lost, 0, weight)
@@ -241,20 +249,20 @@ class Tracer:
 
     def _guided_turn(self, vertex: Vertex, u: Array2f, guide: Guide) -> Turn:
         """A direction to a point of a patch, or by the BRDF."""
-        brdf, guided = vertex.brdf, (vertex.patch > 0) & (u.x < GUIDED)
-        share = self._unguided(vertex)
-        u = vec2(dr.select(guided, u.x / GUIDED, (u.x - (1 - share)) / share), u.y)
+        brdf, share = vertex.brdf, vertex.share
+        guided, unguided = u.x < share, 1 - share
+        u = vec2(dr.select(guided, u.x / share, (u.x - share) / unguided), u.y)
         aimed, facet = guide.aim(vertex.patch, vertex.hit.point, u, guided)
         sample = brdf.sample(u)
         direction = dr.select(guided, aimed, sample.direction)
         of_aimed = cosine_hemisphere_pdf(dr.dot(brdf.shading_normal, aimed))
-        pdf = share * dr.select(guided, of_aimed, sample.pdf)
+        pdf = unguided * dr.select(guided, of_aimed, sample.pdf)
         aim = dr.select(guided, facet, NOWHERE)
-        return Turn(direction, brdf.weight(direction) / share, pdf, aim)
+        return Turn(direction, brdf.weight(direction) / unguided, pdf, aim)
 
-    def _unguided(self, vertex: Vertex) -> Float:
-        """The share of the directions from there that follow the BRDF."""
-        return dr.select(vertex.patch > 0, self.scene.types.Float32(1 - GUIDED), 1)
+    def _share(self, patch: UInt32, vertices: Any) -> Any:
+        """The share of the directions from a patch that a guide chooses, with so many to come."""
+        return self.shares.of(patch, vertices) if self.shares else 0
 
     def _emission(self, path: Path, hit: Hit, counts: Bool | bool, *, weighted: bool) -> Array3f:
         """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
@@ -280,7 +288,7 @@ class Tracer:
         if self.features.mis:
             pdf = brdf.pdf(sample.direction)
             if self.guide is not None:
-                pdf *= self._unguided(vertex)
+                pdf *= 1 - vertex.share
             value *= power_heuristic(pdf * sample.inverse_pdf)
         traced = hit.valid & ~(dr.max(value) <= 0)
         ray = Ray(hit.point, sample.direction)

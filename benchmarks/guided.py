@@ -1,0 +1,170 @@
+"""Whether guided paths are ever noisier than those of ``mis``: ``python -m benchmarks.guided``.
+
+For each scene and number of bounces, the relMSE of ``guided`` over that of ``mis`` with as many
+samples, and the interval that covers 95 % of it, by a bootstrap over seeds. Where both pictures are
+the same there is "=". The exit status is 1 where the upper end is beyond a bound, or where the
+means of both modes differ. All scenes and bounces take half an hour on two cores; each can be named.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser
+from random import Random
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from benchmarks.bench.scenes import CORNELL_BOXES
+from drpt import Camera, Diffuse, Mesh, Mode, Phong, Scene, Sphere, load_scene
+from drpt.error import DARK
+from drpt.render import Rendering
+from drpt.scene.builtin import builtin_names
+from tests.random_scenes import tame_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from drpt.scene import Shape
+
+    Floats = NDArray[np.float64]
+
+SIDE, SPP, SEEDS = 32, 16, 32
+"""Pixels along a side of a picture, samples of each, and pictures of each mode."""
+REFERENCE_SPP, REFERENCES = 64, 32
+REFERENCE_SEED = 2**20
+BOUNCES = (1, 2, 3, 4, 8, 16, 32, 64, 128)
+RANDOM_SCENES = 20
+RESAMPLES = 2000
+COVERED = (0.025, 0.975)
+BOUND, BOX_BOUNDS = 1.1, {2: 0.5, 3: 0.5, 4: 0.5, 8: 0.5, 32: 0.6}
+GREATEST_Z = 4.5
+"""Of differences of means, 300 of which are looked at: by chance beyond it once in 500 tables."""
+
+
+class Ratio(NamedTuple):
+    """RelMSE of ``guided`` over that of ``mis``, its interval, and z of the means' difference."""
+
+    value: float
+    low: float
+    high: float
+    z: float
+
+    def __str__(self) -> str:
+        same = self.low == self.high == 1
+        return "=" if same else f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}] {self.z:+.1f}"
+
+
+def main() -> int:
+    """Print the table; return 1 if a bound is exceeded."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("scenes", nargs="*", help="names; all by default")
+    parser.add_argument("--bounces", nargs="+", type=int, default=BOUNCES)
+    args = parser.parse_args()
+    scenes = make_scenes()
+    print(f"| scene | {' | '.join(map(str, args.bounces))} |\n|---|{'---|' * len(args.bounces)}")
+    failed = []
+    for name in args.scenes or scenes:
+        ratios = [measure(scenes[name](), bounces) for bounces in args.bounces]
+        print(f"| {name} | {' | '.join(map(str, ratios))} |", flush=True)
+        found = zip(args.bounces, ratios, strict=True)
+        failed += [f"{name}, {k} bounces: {r}" for k, r in found if is_beyond(name, k, r)]
+    print("", *(f"beyond a bound: {row}" for row in failed), sep="\n")
+    return 1 if failed else 0
+
+
+def is_beyond(name: str, bounces: int, ratio: Ratio) -> bool:
+    """Whether a ratio is larger than it may be, or the means differ."""
+    bound = BOX_BOUNDS.get(bounces, BOUND) if name in CORNELL_BOXES else BOUND
+    return not (ratio.high <= bound and abs(ratio.z) <= GREATEST_Z)
+
+
+def measure(scene: Scene, bounces: int) -> Ratio:
+    """Compare both modes, with the same seeds."""
+    guided, mis = (pictures(scene, bounces, mode, SPP, SEEDS) for mode in (Mode.GUIDED, Mode.MIS))
+    if np.array_equal(guided, mis):
+        return Ratio(1, 1, 1, 0)
+    truth = pictures(scene, bounces, Mode.MIS, REFERENCE_SPP, REFERENCES, REFERENCE_SEED).mean(
+        axis=0
+    )
+    errors = [((x - truth) ** 2 / (truth**2 + DARK)).mean(axis=(1, 2)) for x in (guided, mis)]
+    chosen = np.random.default_rng(0).integers(0, SEEDS, (RESAMPLES, SEEDS))
+    resampled = [error[chosen].mean(axis=1) for error in errors]
+    low, high = np.quantile(resampled[0] / resampled[1], COVERED)
+    difference = (guided - mis).mean(axis=(1, 2))
+    z = difference.mean() / (difference.std(ddof=1) / np.sqrt(SEEDS))
+    return Ratio(errors[0].mean() / errors[1].mean(), low, high, z)
+
+
+def pictures(scene: Scene, bounces: int, mode: Mode, spp: int, count: int, seed: int = 1) -> Floats:
+    """Independent pictures, (count, pixels, 3)."""
+    launcher = Rendering(scene, spp, bounces, mode).launcher
+    pixels = range(scene.camera.width * scene.camera.height)
+    sums = launcher.launch_passes(pixels, range(spp), range(count), seed).radiance
+    return np.asarray(sums / spp)
+
+
+def make_scenes() -> dict[str, Callable[[], Scene]]:
+    """What is measured, by name: built-in scenes, rooms, open scenes, and random ones."""
+    scenes: dict[str, Callable[[], Scene]] = {}
+    for name in (*CORNELL_BOXES, *(n for n in builtin_names() if n not in CORNELL_BOXES)):
+        scenes[name] = lambda name=name: load_scene(name).resized(SIDE, SIDE)  # type: ignore[misc]
+    scenes |= {f"white room, {a:g}": lambda a=a: room(a, LAMP) for a in ALBEDOS}  # type: ignore[misc]
+    scenes |= {
+        "white room, large lamp": lambda: room(1, Sphere((0.5, 0.6, 0.6), 0.35, radiance=1)),
+        "white room, panel": lambda: room(0.9, PANEL),
+        "room with a mirror": lambda: room(0.8, LAMP, Sphere((0.3, 0.2, 0.6), 0.2, SHINY)),
+        "room with a ball": lambda: room(0.8, PANEL, Sphere((0.3, 0.2, 0.6), 0.2, Diffuse(0.8))),
+        "floor and wall": lambda: outside(SUN, WALL),
+        "two lamps": lambda: outside(SUN, WALL, Sphere((-3, 1, 2), 0.2, radiance=50)),
+        "mirror before a wall": lambda: outside(SUN, WALL, Sphere((1.2, 1, 1), 1, SHINY)),
+        "mirror on a floor": lambda: outside(SUN, Sphere((1.2, 1, 1), 1, SHINY)),
+    }
+    for number in range(RANDOM_SCENES):
+        scenes[f"random {number}"] = lambda n=number: tame_scene(Random(n), SIDE)  # type: ignore[misc]
+    return scenes
+
+
+ALBEDOS = (0.5, 0.9, 1)
+SHINY = Phong(0.85, 1000)
+LAMP = Sphere((0.5, 0.8, 0.5), 0.1, radiance=10)
+SUN = Sphere((0, 3, 0), 0.5, radiance=20)
+
+
+def quads(corners: Sequence[Sequence[float]], *sides: Sequence[int], **surface: object) -> Mesh:
+    """A mesh of quadrilaterals."""
+    faces = [face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))]
+    return Mesh(corners, faces, **surface)  # type: ignore[arg-type]
+
+
+PANEL = quads(
+    [(0.35, 0.99, 0.35), (0.65, 0.99, 0.35), (0.65, 0.99, 0.65), (0.35, 0.99, 0.65)],
+    (0, 1, 2, 3),
+    radiance=10,
+)
+WALL = quads(
+    [(-4, 0, -4), (4, 0, -4), (4, 4, -4), (-4, 4, -4)],
+    (0, 1, 2, 3),
+    material=Diffuse((0.7, 0.4, 0.3)),
+)
+FLOOR = quads([(-4, 0, -4), (-4, 0, 4), (4, 0, 4), (4, 0, -4)], (0, 1, 2, 3), material=Diffuse(0.7))
+SIX = (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (3, 2, 6, 7), (0, 3, 7, 4), (1, 5, 6, 2)
+
+
+def room(albedo: float, *shapes: Shape) -> Scene:
+    """A closed cube, seen from within."""
+    corners = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    camera = Camera((0.5, 0.5, 0.05), (0.5, 0.45, 1), (0, 1, 0), 70, SIDE, SIDE)
+    return Scene(camera, [quads(corners, *SIX, material=Diffuse(albedo)), *shapes])
+
+
+def outside(*shapes: Shape) -> Scene:
+    """A floor with shapes on it, under a black sky."""
+    camera = Camera((0, 3, 9), (0, 0.5, 0), (0, 1, 0), 40, SIDE, SIDE)
+    return Scene(camera, [FLOOR, *shapes])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
