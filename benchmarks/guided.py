@@ -3,7 +3,7 @@
 For each scene and number of bounces, the relMSE of ``guided`` over that of ``mis`` with as many
 samples, and the interval that covers 95 % of it, by a bootstrap over seeds. Where both pictures are
 the same there is "=". The exit status is 1 where the upper end is beyond a bound, or where the
-means of both modes differ. All scenes and bounces take half an hour on two cores; each can be named.
+means of both modes differ. All of them take half an hour on two cores; each can be named.
 """
 
 from __future__ import annotations

@@ -124,8 +124,8 @@ def features(**flags: bool) -> Callable[[], list[AbstractContextManager[Any]]]:
     """Features as told, whatever the scene needs."""
     of = Features.of
 
-    def told(primitives: Primitives, bounces: int, mode: Mode) -> Features:
-        return replace(of(primitives, bounces, mode), **flags)
+    def told(primitives: Primitives, bounces: int, mode: Mode, **known: bool) -> Features:
+        return replace(of(primitives, bounces, mode, **known), **flags)
 
     return lambda: [
         patch.object(Features, "of", told),

@@ -41,9 +41,10 @@ def drpt(mode: Mode, sampler: str) -> Factory:
 
     def load(scene: Scene, bounces: int) -> Render:
         def rendered(spp: int, seed: int) -> Picture:
-            from drpt.kernel.launch import learned
+            from drpt.kernel.launch import learned, piloted
 
             learned.forget()
+            piloted.forget()
             result = render(scene, spp, bounces, mode, sampler=sampler, seed=seed)
             return Picture(result.image, result.rays)
 

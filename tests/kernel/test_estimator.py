@@ -51,6 +51,8 @@ NO_FACETS = "there are no facets, which alone have patches"
 NOTHING_FILLS = "there are no facets, which alone fill pixels"
 TOO_MUCH = "too much may stand before the facets"
 AT_ONCE = "lanes follow camera rays and others at once"
+NOT_LESS = "the noise is not expected to become less"
+BOTH = "mode guided finds lights in two ways"
 ONE_BOUNCE = "1 bounce: nothing comes after the direct light"
 
 COURSE_NAMES = {
@@ -68,11 +70,15 @@ def features(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> set[str]:
     return {name for name, on in found.items() if on}
 
 
-def facts(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> dict[str, Fact]:
+def facts(
+    *shapes: Shape, bounces: int = 2, mode: str = "mis", worthwhile: bool = True
+) -> dict[str, Fact]:
     """All that is told of the kernel of a scene."""
     primitives = make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes).shapes)
     what = primitives, bounces, Mode(mode)
-    return feature_facts(*what) | layout_facts(*what)
+    told = feature_facts, layout_facts
+    features, layout = (facts_of(*what, worthwhile=worthwhile) for facts_of in told)
+    return features | layout
 
 
 def test_there_are_six_modes() -> None:
@@ -194,8 +200,12 @@ def test_implicit_modes_sample_no_light(mode: str) -> None:
     assert not features(BALL, LAMP, mode=mode) & {"direct_light", "sphere_light_samples", "mis"}
 
 
-def test_only_mis_weighs() -> None:
-    assert [mode for mode in Mode if "mis" in features(BALL, LAMP, mode=mode)] == [Mode.MIS]
+def test_mis_weighs_and_so_does_guided_without_a_guide() -> None:
+    def weighing(*shapes: Shape) -> list[Mode]:
+        return [mode for mode in Mode if "mis" in features(*shapes, mode=mode)]
+
+    assert weighing(*HOUSE) == [Mode.MIS]
+    assert weighing(BALL, LAMP) == [Mode.MIS, Mode.GUIDED]
 
 
 def test_every_feature_is_told() -> None:
@@ -218,15 +228,20 @@ def test_every_feature_is_told() -> None:
         ("light_choice", (False, "there is one light"), [BALL, LAMP], {}),
         ("light_choice", (True, "one of 2 lights at every vertex"), [BALL, LAMP, PANEL], {}),
         ("mis", (False, "mode explicit counts no light that it runs into"), [BALL, LAMP], EXPLICIT),
-        ("mis", (False, ONE_SPHERE), [TRIANGLE, LAMP], GUIDED),
-        ("mis", (True, "mode guided finds lights in two ways"), [TRIANGLE, LAMP, PANEL], GUIDED),
-        ("mis", (True, "mode guided finds lights in two ways"), [TRIANGLE, SMOOTH, LAMP], GUIDED),
+        ("mis", (False, ONE_SPHERE), [*HOUSE], GUIDED),
+        ("mis", (True, BOTH), [TRIANGLE, LAMP], GUIDED),
+        ("mis", (True, BOTH), [BALL, LAMP], GUIDED),
+        ("mis", (True, BOTH), [*HOUSE], GUIDED | {"bounces": 1}),
+        ("mis", (True, BOTH), [*HOUSE], GUIDED | {"worthwhile": False}),
+        ("mis", (True, BOTH), [TRIANGLE, LAMP, PANEL], GUIDED),
+        ("mis", (True, BOTH), [TRIANGLE, SMOOTH, LAMP], GUIDED),
         ("guiding", (True, "mode guided goes where patches reflect much light"), [*HOUSE], GUIDED),
         ("guiding", (False, "mode mis follows the BRDF"), [*HOUSE], {}),
         ("guiding", (False, NO_FACETS), [BALL, LAMP], GUIDED),
         ("guiding", (False, NO_FACETS), [STRIPES, LAMP], GUIDED),
         ("guiding", (False, "no facet is diffuse"), [BALL, SMOOTH, LAMP], GUIDED),
         ("guiding", (False, ONE_BOUNCE), [*HOUSE], GUIDED | {"bounces": 1}),
+        ("guiding", (False, NOT_LESS), [*HOUSE], GUIDED | {"worthwhile": False}),
         ("covered_pixels", (True, "what fills a pixel need not be looked for"), [*HOUSE], {}),
         ("covered_pixels", (False, NOTHING_FILLS), [BALL, LAMP], {}),
         ("covered_pixels", (False, TOO_MUCH), [ROOM, *BALLS, LAMP], {}),

@@ -23,6 +23,8 @@ from tests.conftest import TYPES, to_device, to_host, unit_square
 from tests.measuring import assert_agree, measure, with_picture
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from drpt.kernel.facets import Facet
     from drpt.scene import Shape
     from tests.oracle.arrays import Floats
@@ -179,9 +181,13 @@ def test_a_hit_far_outside_its_facet_is_in_no_patch(guide: Guide) -> None:
     assert (np.array(guide.patch_of(hit_at(points, 0))) == 0).all()
 
 
-@pytest.mark.parametrize("scene", [BOX, GLOSSY], ids=["diffuse", "glossy"])
+@pytest.mark.parametrize(
+    ("scene", "bounces"),
+    [(BOX, 3), (GLOSSY, 3), pytest.param(GLOSSY, 6, marks=pytest.mark.slow)],
+    ids=["diffuse", "glossy", "in a loop"],
+)
 @pytest.mark.parametrize("wrong", ["random", "of one patch", "none"])
-def test_wrong_knowledge_makes_noise_alone(scene: drpt.Scene, wrong: str) -> None:
+def test_wrong_knowledge_makes_noise_alone(scene: drpt.Scene, bounces: int, wrong: str) -> None:
     def guess(*_: object) -> Floats:
         count = len(make_patches(facets_of(scene.shapes)).there)
         light = np.random.default_rng(3).exponential(size=(count, count)) ** 4
@@ -189,9 +195,14 @@ def test_wrong_knowledge_makes_noise_alone(scene: drpt.Scene, wrong: str) -> Non
         return np.asarray(light * kept[wrong])
 
     small = with_picture(scene, 24, 24)
-    with patch.object(learning, "_exchange", guess):
-        guided = measure(small, 2**22, 3, "guided")
-    assert_agree(guided, measure(small, 2**22, 3, "mis"), DETECTABLE)
+    with patch.object(learning, "_exchange", guess), always_guided():
+        guided = measure(small, 2**22, bounces, "guided")
+    assert_agree(guided, measure(small, 2**22, bounces, "mis"), DETECTABLE)
+
+
+def always_guided() -> AbstractContextManager[object]:
+    """Let no guide be left out, whatever it is expected to bring."""
+    return patch.object(launch, "best_shares", lambda _, shares, __: shares)
 
 
 @pytest.mark.parametrize(("scene", "plain"), [(BOX, "explicit"), (GLOSSY, "mis")])
@@ -210,6 +221,56 @@ def test_without_facets_it_is_mis() -> None:
     balls = replace(scene, shapes=shapes)
     guided, mis = (drpt.render(balls, 16, 3, mode).image for mode in ("guided", "mis"))
     np.testing.assert_array_equal(guided, mis)
+
+
+def test_with_one_bounce_it_is_mis() -> None:
+    small = with_picture(BOX, 16, 16)
+    guided, mis = (drpt.render(small, 16, 1, mode).image for mode in ("guided", "mis"))
+    np.testing.assert_array_equal(guided, mis)
+
+
+@pytest.mark.parametrize("scene", [BOX, GLOSSY], ids=["diffuse", "glossy"])
+def test_a_colour_compiles_nothing(scene: drpt.Scene) -> None:
+    """Though the share of the guide depends on it."""
+    small = with_picture(scene, 16, 16)
+    assert isinstance(small.shapes[1].material, drpt.Diffuse)
+    dark = replace(small.shapes[1], material=drpt.Diffuse(0.4))
+    darker = replace(small, shapes=(small.shapes[0], dark, *small.shapes[2:]))
+    made = [
+        make_launcher(TYPES, s, 6, drpt.Mode.GUIDED, "sobol", jitter=True) for s in (small, darker)
+    ]
+    light, dim = (launcher.tracer.shares for launcher in made)
+    assert light is not None
+    assert dim is not None
+    assert (dim.table.numpy() != light.table.numpy()).any()
+    first, second = map(kernel_of, made)
+    assert first == second
+
+
+def kernel_of(launcher: launch.Launcher) -> str:
+    """Hash of the kernel of a launch."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        launcher.launch(range(4), range(1), 1, 0)
+        kernels = dr.kernel_history((dr.KernelType.JIT,))
+    return str(max(kernels, key=lambda kernel: int(kernel["operation_count"]))["hash"])
+
+
+@pytest.mark.slow
+def test_a_white_room_is_no_noisier_with_many_bounces() -> None:
+    """A constant share of a half has 6 times the error there."""
+    cube = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    halves = [half for a, b, c, d in quads for half in ((a, b, c), (a, c, d))]
+    walls = drpt.Mesh(cube, halves, material=drpt.Diffuse(0.95))
+    lamp = drpt.Sphere((0.5, 0.8, 0.5), 0.1, radiance=10)
+    camera = drpt.Camera((0.5, 0.5, 0.05), (0.5, 0.45, 1), (0, 1, 0), 70, 32, 32)
+    scene = drpt.Scene(camera, [walls, lamp])
+    truth = drpt.render(scene, 4096, 16, "mis", seed=1)
+    mis, guided = (
+        rel_mse(drpt.render(scene, 64, 16, mode, seed=2).image, truth) for mode in ("mis", "guided")
+    )
+    assert guided < 1.1 * mis
 
 
 def test_knowledge_is_the_same_each_time() -> None:

@@ -5,7 +5,8 @@ others lead to a point of a patch, chosen by the light that patches are known to
 With the densities p of the BRDF's directions and q of the patches' points, both per solid angle, a
 path that arrives at a point has the weight f cos θ / ((1 − c) p + c q), however it was chosen; one
 that was aimed at a point and meets another facet before is lost (Veach & Guibas 1995, the balance
-heuristic for one sample). So what is known may be wrong: weights stay below 1 / (1 − c).
+heuristic for one sample). So what is known may be wrong: weights stay below 1 / (1 − c). Module
+`guide_share` has the share c.
 
 Source: Jensen 1995, "Importance Driven Path Tracing using the Photon Map", for the idea; patches
 are those of radiosity.

@@ -92,7 +92,8 @@ def fly(
     light, ratio, row = (np.array([x.numpy() for x in part]) for part in found)
     shape = -1, width * height, SAMPLES
     light, ratio = (part.astype(np.float64).reshape(shape) for part in (light, ratio))
-    return Pilot(np.diff(light, axis=0, prepend=0), ratio, row.reshape(shape))
+    with np.errstate(invalid="ignore"):  # infinite light: nothing is expected of a guide then
+        return Pilot(np.diff(light, axis=0, prepend=0), ratio, row.reshape(shape))
 
 
 def _follow(

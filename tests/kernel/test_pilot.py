@@ -1,0 +1,100 @@
+"""What a guide is expected to bring."""
+
+from __future__ import annotations
+
+from random import Random
+from typing import TYPE_CHECKING
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+import drpt
+from drpt.kernel import launch
+from drpt.kernel.launch import make_launcher
+from drpt.kernel.pilot import Pilot, best_shares, expected
+from tests.conftest import TYPES
+from tests.measuring import assert_agree, measure, with_picture
+from tests.random_scenes import tame_scene
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tests.oracle.arrays import Floats
+
+PIXELS, SAMPLES = 512, 256
+CLOSE = 0.1
+"""Relative, of an expected ratio: of the noise in so many samples."""
+DETECTABLE = 0.01
+HALF = np.array([[0, 0, 0], [0, 0.5, 0.5]])
+"""Shares: half of the directions from patches of row 1, with 1 or 2 vertices to come."""
+
+
+def pilot_of(light: Floats, ratio: Floats) -> Pilot:
+    """Paths that get light at their second vertex alone, all of them from patches of row 1."""
+    return Pilot(
+        np.stack([np.zeros_like(light), light]), ratio[None], np.ones((1, *ratio.shape), np.uint32)
+    )
+
+
+def quarter() -> NDArray[np.bool_]:
+    """Whether each path goes where all light comes from, a quarter of the directions."""
+    return np.random.default_rng(0).random((PIXELS, SAMPLES)) < 0.25
+
+
+def test_a_guide_that_knows_where_light_comes_from_pays() -> None:
+    """It leads there always: half of the directions have 5/8 there, and weigh 1 / 2.5.
+
+    With p = 1/4 the variance falls from p − p² to p / 2.5 − p², a fifth.
+    """
+    lit = quarter()
+    pilot = pilot_of(lit.astype(float), np.where(lit, 4.0, 0))
+    assert expected(pilot, HALF, 2) == pytest.approx(0.2, rel=CLOSE)
+    assert best_shares(pilot, HALF, 2) is not None
+
+
+def test_a_guide_that_leads_elsewhere_does_not() -> None:
+    """The chance of the light is halved: p / (1/2) − p², 7/3 of the variance."""
+    lit = quarter()
+    pilot = pilot_of(lit.astype(float), np.where(lit, 0, 4 / 3))
+    assert expected(pilot, HALF, 2) == pytest.approx(7 / 3, rel=CLOSE)
+    assert best_shares(pilot, HALF, 2) is None
+
+
+def test_what_cannot_be_told_is_not_guided() -> None:
+    for light in (0.0, np.nan, np.inf):
+        pilot = pilot_of(np.full((4, 8), light), np.ones((4, 8)))
+        assert best_shares(pilot, HALF, 2) is None
+
+
+def guide_of(scene: drpt.Scene, bounces: int) -> object:
+    made = make_launcher(TYPES, scene, bounces, drpt.Mode.GUIDED, "sobol", jitter=True)
+    return made.tracer.guide
+
+
+def test_boxes_are_guided_and_a_mirror_on_a_floor_is_not() -> None:
+    glossy = drpt.load_scene("cornell-box-glossy")
+    assert guide_of(glossy, 3) is not None
+    floor = [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]]
+    scene = drpt.Scene(
+        drpt.Camera((0, 3, 9), (0, 0.5, 0), (0, 1, 0), 40, 32, 32),
+        [
+            drpt.Mesh(floor, [[0, 1, 2], [0, 2, 3]], material=drpt.Diffuse(0.7)),
+            drpt.Sphere((0, 3, 0), 0.5, radiance=20),
+            drpt.Sphere((1.2, 1, 1), 1, drpt.Phong(0.85, 1000)),
+        ],
+    )
+    assert guide_of(scene, 3) is None
+    guided, mis = (drpt.render(scene, 4, 3, mode).image for mode in ("guided", "mis"))
+    np.testing.assert_array_equal(guided, mis)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 6])
+@pytest.mark.parametrize("bounces", [3, 7])
+def test_guided_means_are_those_of_mis_where_a_guide_is_left_out(seed: int, bounces: int) -> None:
+    """Vertices that stand one after the other in the kernel, and those of its loop."""
+    scene = with_picture(tame_scene(Random(seed), 16), 16, 16)
+    with patch.object(launch, "best_shares", lambda _, shares, __: shares):
+        guided = measure(scene, 2**21, bounces, "guided")
+    assert_agree(guided, measure(scene, 2**21, bounces, "mis"), DETECTABLE)
