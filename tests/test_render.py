@@ -383,3 +383,9 @@ def test_a_large_picture_fits_into_memory() -> None:
     mean, kibibytes = map(float, done.stdout.split())
     assert mean > 0.8
     assert kibibytes * 1024 < MAX_BYTES
+
+
+def test_a_picture_that_memory_cannot_hold_is_refused_with_its_size() -> None:
+    scene = drpt.load_scene("cornell-box").resized(65536, 65536)
+    with pytest.raises(ValueError, match=r"65536x65536 needs 721\.6 GB of memory, and .* are free"):
+        drpt.Rendering(scene)

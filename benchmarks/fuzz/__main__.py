@@ -9,12 +9,7 @@ from pathlib import Path
 from benchmarks.fuzz.harness import OUT, fuzz
 from benchmarks.fuzz.worker import load
 
-TARGETS = (
-    "exr",
-    "meshes",
-    "mitsuba",
-    "scenes",
-)
+TARGETS = ("checkpoints", "exr", "meshes", "mitsuba", "scenes")
 """Modules of this package, each with a ``TARGET``."""
 
 

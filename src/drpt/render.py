@@ -22,6 +22,7 @@ from drpt.film import Film
 from drpt.immutable import immutable
 from drpt.kernel import backend
 from drpt.kernel.estimator import SHARING_SPP, Mode, feature_facts, layout_facts
+from drpt.machine import require_memory
 from drpt.missed import missed
 from drpt.plan import parts, plan_passes, run_length
 from drpt.progress import with_bar
@@ -55,6 +56,10 @@ PACKAGES = ("drjit", "mitsuba", "numpy")
 """Those that a picture's bits come from, beside drpt itself."""
 OTHER_SEED = 2**32
 """Added to the seed, it gives other noise."""
+PIXEL_BYTES = 72
+"""Bytes of a pixel: its sum, the mean of a result, and its image, in float64 and float32."""
+ERROR_BYTES = PIXEL_BYTES + 8 * 12
+"""With the sums of eight blocks."""
 FIRST_HIT_SPP = 64
 """Samples after which layers of first hits are as smooth as edges in 8 bits."""
 
@@ -91,6 +96,9 @@ class Rendering:
         self._has_error = check_switch("error", error)
         if target_error is not None and not error:
             raise refuse("error", error, "True where there is a target_error")
+        width, height = scene.camera.width, scene.camera.height
+        needed = self.settings.pixels * (ERROR_BYTES if error else PIXEL_BYTES)
+        require_memory(needed, f"width, height: a picture of {width}x{height}")
         self._film = Film(self.settings.pixels, blocks=error)
         self._rays = 0
         self._non_finite = 0
