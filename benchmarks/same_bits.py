@@ -60,12 +60,16 @@ def main() -> int:
 
 
 def _start(checkout: Path, cases: list[tuple[str, str, int]]) -> subprocess.Popen[str]:
-    """A process that renders one case after the other by the package of a checkout."""
+    """A process that renders one case after the other by the package of a checkout.
+
+    It runs in the checkout's own environment, if that has been made.
+    """
     package = checkout / "src"
     if not (package / "drpt").is_dir():
         sys.exit(f"same_bits: {checkout} is no checkout of drpt: it has no folder src/drpt")
+    own = checkout / ".venv/bin/python"
     process = subprocess.Popen(
-        [sys.executable, "-c", RENDER],
+        [own if own.exists() else sys.executable, "-c", RENDER],
         env={**os.environ, "PYTHONPATH": str(package)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import hypot, pi, sqrt
+from math import hypot, log, pi, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -136,6 +136,25 @@ def lost_at_seams(world: World, shape: Callable[[Floats, float], Mesh]) -> Measu
         targets = corners[:, 0] + share * (corners[:, 1] - corners[:, 0])
         origins = center + 0.3 * sample_uniform_sphere(rng, samples)
         found = world(mesh, light).closest(origins, normalize(targets - origins))
+        return float((~found.reflects).mean())
+
+    return error
+
+
+def lost_in_fine_mesh(world: World, *, at_corners: bool) -> Measure:
+    """Share of rays out of a closed mesh of so many triangles, at its corners or at random."""
+
+    def error(triangles: float, samples: int) -> float:
+        rng = np.random.default_rng(0)
+        center, light = beside(1, 0.1)
+        mesh = icosphere(round(log(triangles / 20, 4)), center, 1)
+        origins = center + 0.3 * sample_uniform_sphere(rng, samples)
+        if at_corners:
+            corners = mesh.vertices[rng.integers(0, len(mesh.vertices), samples)]
+            directions = normalize(corners - origins)
+        else:
+            directions = sample_uniform_sphere(rng, samples)
+        found = world(mesh, light).closest(origins, directions)
         return float((~found.reflects).mean())
 
     return error
@@ -305,6 +324,22 @@ def at_seams(
     )
 
 
+def fine_mesh(name: str, rays: int, bound: float, reason: str, *, at_corners: bool) -> Case:
+    """A case of rays out of ever finer meshes."""
+    return Case(
+        name=name,
+        parameter="triangles",
+        values=(1280.0, 5120.0, 20480.0, 81920.0),
+        quick=(1280.0, 20480.0),
+        error=lost_in_fine_mesh(Drpt, at_corners=at_corners),
+        bound=bound,
+        reason=reason,
+        naive="each triangle rounds its edge in its own way, and rays pass between two of them",
+        samples=rays,
+        mitsuba=lost_in_fine_mesh(Mitsuba, at_corners=at_corners),
+    )
+
+
 CASES = (
     Case(
         name="outline of a sphere from afar",
@@ -335,6 +370,8 @@ CASES = (
     at_seams("an icosahedron", _icosahedron),
     at_seams("a mesh of 1280 triangles", _fine, 1e-3, CORNERS),
     at_seams("a cube of needles 1e6 : 1", _needles, 1e-3, CORNERS),
+    fine_mesh("rays aimed at the corners of a mesh", 2**18, 0.01, CORNERS, at_corners=True),
+    fine_mesh("rays at random in a mesh", 2**20, 0, NONE, at_corners=False),
     Case(
         name="gap between concentric spheres",
         parameter="gap / radius",

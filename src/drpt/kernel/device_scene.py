@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -30,8 +31,18 @@ if TYPE_CHECKING:
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.solids import Solid
 
+AFAR = 2.0**16
+"""A sphere is seen from afar from so many of its radii on.
+
+There distances are rounded by 2⁻²⁴ of themselves, which is 1/256 of its radius.
+"""
 LARGE = 1 / 16
 """A sphere is large if the origin is no farther from its surface, relative to its radius."""
+NEAR = 16
+"""It is so for rays alone that start no farther away, relative to its radius.
+
+The power of their origin is rounded by 2⁻²⁴ of the square of its distance.
+"""
 
 
 class SurfaceRow(NamedTuple):
@@ -86,6 +97,8 @@ class DeviceScene:
         Which light is chosen, where there are several.
     light_corners
         Rows of 9 by emitting triangle.
+    afar
+        Whether rays may come to spheres from afar, see `AFAR`.
     """
 
     types: ModuleType
@@ -109,6 +122,24 @@ class DeviceScene:
     light_corners: Float
     light_count: int
     sphere_lights: int
+    afar: bool = False
+
+    def seen_from(self, eye: NDArray[np.float64], primitives: Primitives) -> DeviceScene:
+        """The same scene for rays from an eye, too, and from all of its primitives."""
+        if not len(primitives.spheres):
+            return self
+        extent, radii = primitives.extent(eye), primitives.spheres[:, 3]
+        afar = bool(extent > AFAR * radii.min())
+        many = copy(self.many_spheres)
+        if many is not None:
+            many.afar = afar
+
+        def seen(number: int, ball: Ball) -> tuple[int, Ball]:
+            near = extent <= NEAR * radii[number - self.first_sphere]
+            return number, replace(ball, power=ball.power if near else None, afar=afar)
+
+        balls = tuple(seen(number, ball) for number, ball in self.balls)
+        return replace(self, balls=balls, many_spheres=many, afar=afar)
 
     def surface_row(self, primitive: UInt32, active: Any = True) -> SurfaceRow:
         """The row of a primitive; zeros for lanes that are not active."""

@@ -75,6 +75,7 @@ def first_hits(
     """
     with interrupts_put_off():
         primitives, on_device = prepare(scene.shapes, types)
+        on_device = on_device.seen_from(scene.camera.eye - primitives.origin, primitives)
         features = _features(primitives)
         covering = covered(scene.camera, scene.shapes, types) if features.covered_pixels else None
         camera = make_camera(scene.camera, primitives.origin, on_device.types)

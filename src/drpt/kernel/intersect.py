@@ -8,6 +8,7 @@ import drjit as dr
 
 from drpt.kernel.device_scene import SurfaceRow
 from drpt.kernel.meet import (
+    across,
     dot_constant,
     meet_facet,
     meet_solid,
@@ -58,7 +59,9 @@ class Known(NamedTuple):
 
 
 class ManySpheres(Protocol):
-    """Spheres in a hierarchy."""
+    """Spheres in a hierarchy; rays may come from ``afar``, see `Ball`."""
+
+    afar: bool
 
     def walk(
         self,
@@ -327,8 +330,12 @@ def _on_primitive(
 ) -> _Place:
     if not features.spheres:
         return _on_facet(row, p)
-    reflect = _some_spheres_reflect(scene, features)
-    on_sphere = _on_sphere(row, p, ray) if reflect else _on_sphere_light(row, p)
+    if scene.afar:
+        on_sphere = _on_sphere_afar(row, ray)
+    elif _some_spheres_reflect(scene, features):
+        on_sphere = _on_sphere(row, p, ray)
+    else:
+        on_sphere = _on_sphere_light(row, p)
     for number, ball in scene.balls:
         if ball.power is not None:
             on_ball = _on_large_sphere(ball, ball.power, p)
@@ -350,6 +357,23 @@ def _on_sphere(row: Array4f, p: Array3f, ray: Ray) -> _Place:
     spoke = p - center
     length = dr.norm(spoke)
     normal = dr.select(length > 0, spoke * dr.rcp(length), -ray.direction)
+    point = dr.fma(normal, radius, center)
+    return point, normal, largest(point) + radius
+
+
+def _on_sphere_afar(row: Array4f, ray: Ray) -> _Place:
+    """As on a sphere, but from the line of the ray, and from where it starts.
+
+    A point of the ray may be rounded by more than the radius. How far aside of the centre the ray
+    passes is known, and it meets the half of the sphere before it, or from inside the other one.
+    """
+    center, radius = vec3(row[0], row[1], row[2]), row[3]
+    from_center = ray.origin - center
+    aside = across(across(from_center, ray.direction), ray.direction)
+    height = dr.sqrt(greater(dr.square(radius) - dr.squared_norm(aside), 0))
+    outside = dr.squared_norm(from_center) > dr.square(radius)
+    spoke = dr.fma(ray.direction, dr.select(outside, -height, height), aside)
+    normal = dr.normalize(spoke)
     point = dr.fma(normal, radius, center)
     return point, normal, largest(point) + radius
 

@@ -190,6 +190,7 @@ def make_launcher(
     the same without.
     """
     primitives, device_scene = prepare(scene.shapes, types)
+    device_scene = device_scene.seen_from(scene.camera.eye - primitives.origin, primitives)
     shares = guide_shares(scene, bounces, mode, types)
     features = Features.of(primitives, bounces, mode, worthwhile=shares is not None)
     if not (features.diffuse or features.phong):

@@ -30,11 +30,14 @@ class Ball:
 
     One that is large against its distance from the origin, such as the ground, also has the
     ``power`` of the origin, |c|² − r²: there the difference would lose all of its digits.
+
+    Rays may come from ``afar``, where distances are rounded by more than its radius.
     """
 
     center: Array3f
     radius: Float
     power: Float | None = None
+    afar: bool = False
 
 
 def meet_box(
@@ -160,11 +163,15 @@ def meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
 
     Source: Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection" (Ray Tracing
     Gems, ch. 7). Rays that start near a large sphere are told by the power of their origin instead.
+    From ``afar``, b is rounded, and the direction's length is not quite 1: what that leaves of the
+    way along the ray is taken off the point next to the centre.
     """
     f = ray.origin - ball.center
     b = -dr.dot(f, ray.direction)
     if ball.power is None:
         closest = dr.fma(ray.direction, b, f)
+        if ball.afar:
+            closest = across(closest, ray.direction)
         r2 = ball.radius * ball.radius
         c, discriminant = dr.dot(f, f) - r2, r2 - dr.dot(closest, closest)
     else:
@@ -175,6 +182,11 @@ def meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
     other = c / q
     near, far = lesser(q, other), greater(q, other)
     return (discriminant > 0) & (far > 0), dr.select(near > 0, near, far)
+
+
+def across(v: Array3f, direction: Array3f) -> Array3f:
+    """What is left of a vector without its part along a direction."""
+    return dr.fma(direction, -dr.dot(v, direction), v)
 
 
 def power_of_point(ball: Ball, of_origin: Float, p: Array3f) -> Float:

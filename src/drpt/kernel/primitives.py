@@ -156,6 +156,17 @@ class Primitives:
         """Whether a body or a sphere holds all of the scene."""
         return any(solid.encloses for solid in self.solids) or self._in_a_sphere()
 
+    def extent(self, eye: Array) -> float:
+        """Diagonal of the box around the scene and an eye: no ray starts farther from a sphere."""
+        low, high = self._corners
+        return float(np.linalg.norm(np.maximum(high, eye) - np.minimum(low, eye)))
+
+    @cached_property
+    def _corners(self) -> tuple[Array, Array]:
+        """Of the box around the scene."""
+        points, radii = self._balls()
+        return (points - radii[:, None]).min(axis=0), (points + radii[:, None]).max(axis=0)
+
     def _in_a_sphere(self) -> bool:
         if not len(self.spheres):
             return False

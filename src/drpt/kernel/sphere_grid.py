@@ -113,6 +113,7 @@ class SphereGrid:
         types: ModuleType,
         upload: Callable[[NDArray[Any]], Any],
     ) -> None:
+        self.afar = False
         rows = rows_of(cells, spheres, numbers)
         self._words, self._spheres, self._numbers = (upload(table) for table in rows)
         self._first = int(numbers[0])
@@ -220,5 +221,5 @@ class SphereGrid:
     def _meet(self, row: UInt32, ray: Ray, close: Bool) -> tuple[UInt32, Bool, Float]:
         """The number of a row's sphere, and whether and where a ray that is close meets it."""
         sphere = gather_row(self._spheres, row, 4, close)
-        met, t = meet_sphere(ray, Ball(vec3(*sphere[:3]), sphere[3]))
+        met, t = meet_sphere(ray, Ball(vec3(*sphere[:3]), sphere[3], afar=self.afar))
         return dr.gather(type(row), self._numbers, row, close), close & met, t

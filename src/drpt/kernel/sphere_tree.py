@@ -76,6 +76,7 @@ class SphereTree:
     def __init__(
         self, spheres: Array, numbers: NDArray[np.intp], upload: Callable[[Array], Float]
     ) -> None:
+        self.afar = False
         self._leaves = 2 ** (len(spheres) - 1).bit_length()
         padded = np.full((self._leaves, 5), np.nan)
         padded[: len(spheres)] = np.column_stack([spheres, numbers])
@@ -101,7 +102,7 @@ class SphereTree:
         ) -> tuple[UInt32, UInt32, Float, UInt32]:
             is_leaf = node >= self._leaves
             row = gather_row(self._rows, node, WIDTH)
-            met, t = meet_sphere(ray, Ball(vec3(*row[:3]), row[3]))
+            met, t = meet_sphere(ray, Ball(vec3(*row[:3]), row[3], afar=self.afar))
             number = types.UInt32(row[4])
             counts = is_leaf if but is None else is_leaf & (number != but)
             end, found = visit(number, counts & met, t, end, found)
