@@ -62,8 +62,8 @@ class World:
         self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
 
 
-ASKEW = np.array([[0.48, 0.6, 0.64], [-0.8, 0.6, 0.0], [-0.384, -0.512, 0.768]])
-ASKEW[2] = np.cross(ASKEW[0], ASKEW[1])
+# A rotation that leaves no coordinate of a ray 0.
+ASKEW = np.array([[0.48, 0.64, -0.6], [-0.8, 0.6, 0.0], [0.36, 0.48, 0.8]])
 
 
 class Rays(NamedTuple):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.view.edits import bounding_box, edited, moved
+from drpt.scene.bounds import bounds
+from drpt.view.edits import edited, moved
 from drpt.view.state import Orbit
 
 ROUNDING = 1e-12  # of float64
@@ -77,7 +78,7 @@ def test_what_is_wrong_is_named(number: int, edit: dict[str, Any], words: str) -
 
 def pivot() -> Any:
     """The middle of the room, on the camera's axis."""
-    low, high = bounding_box(BOX)
+    low, high = bounds(BOX.shapes)
     return np.array([*BOX.camera.eye[:2], (low[2] + high[2]) / 2])
 
 

@@ -37,6 +37,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drpt.scene import Sphere
+from drpt.scene.bounds import bounds
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -159,18 +160,10 @@ def ray_offset(scene: Scene) -> float:
     ``interaction.h``). The size is the longest side of the box around all shapes. Infinite where
     all shapes are in one point.
     """
-    low, high = np.transpose([_bounds(shape) for shape in scene.shapes], (1, 0, 2))
-    low, high = low.min(axis=0), high.max(axis=0)
+    low, high = bounds(scene.shapes)
     reach = max(np.abs(low).max(), np.abs(high).max())
     size = float((high - low).max())
     return 1500 * UNIT * float(1 + reach) / size if size else np.inf
-
-
-def _bounds(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    if isinstance(shape, Sphere):
-        center = np.array(shape.center)
-        return center - shape.radius, center + shape.radius
-    return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
 
 
 def _sphere_lights(scene: Scene) -> list[Caveat]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from drpt.kernel.facets import area_vectors, has_area
 from drpt.scene import Mesh, Sphere
+from drpt.scene.bounds import bounds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,18 +22,31 @@ NO_TRIANGLES = np.empty((0, 3, 3))
 NO_VECTORS = np.empty((0, 3))
 ORIGIN = np.zeros(3)
 FEW_PARTS = 16
-"""Triangles of no more parts than this are taken from each; those of more are copied first."""
+"""Up to this number of parts, corners are gathered part by part; else they are copied first."""
 NO_FACES = np.empty((0, 3), np.int32)
 
 
 class Part(NamedTuple):
-    """The primitives of a shape: a sphere's row (1, 4), or a mesh' polygons.
+    """The primitives of a shape.
 
-    Polygons are triangles (n, 3, 3), with ``normals`` at their corners where the mesh has some, and
-    ``area_vectors`` (n, 3), twice as long as their areas; or a list of outlines (k, 3), once they
-    are merged. ``is_cut`` tells whether some of the mesh is left out. ``zero`` is the point (3,)
-    from which the numbers count that its corners are rounded to: the origin, or that of the scene.
-    Triangles that are not cut have corners that are ``points`` (p, 3), by ``faces`` (n, 3).
+    Attributes
+    ----------
+    number, shape
+        The shape, and its number in the scene.
+    primitives
+        Row (1, 4) of a sphere, or triangles (n, 3, 3) of a mesh, or a list of outlines (k, 3) of
+        polygons, once triangles are merged.
+    normals
+        Normals at the corners of the triangles, (n, 3, 3), if the mesh has any.
+    area_vectors
+        Normals (n, 3) of the triangles, twice as long as their areas.
+    is_cut
+        Whether overlapping shapes have cut the mesh.
+    zero
+        The point (3,) relative to which the corners are rounded: the origin of the kernels, or that
+        of the scene if the mesh came in float32.
+    points, faces
+        Vertices (p, 3) and indices (n, 3) of the triangles of a mesh that is not cut.
     """
 
     number: int
@@ -47,22 +61,32 @@ class Part(NamedTuple):
 
     @property
     def is_light(self) -> bool:
-        """Whether its shape emits."""
+        """Whether the shape emits."""
         return self.shape.is_light
 
     @property
     def triangles(self) -> Array:
-        """The polygons of a mesh that are not merged: triangles (n, 3, 3)."""
+        """The triangles (n, 3, 3) of a mesh, before any are merged."""
         return np.asarray(self.primitives)
 
 
 class Triangles(NamedTuple):
     """The triangles of all meshes, in the order of their shapes.
 
-    ``parts`` are those of the meshes, ``first`` (parts + 1,) the number of the first triangle of
-    each, ``part`` (n,) the place of each triangle's part, ``vectors`` the `Part.area_vectors`,
-    ``zeros`` (parts, 3) the `Part.zero` of each. Where there are many parts, ``together`` are the
-    corners (n, 3, 3) of all.
+    Attributes
+    ----------
+    parts
+        The parts of the meshes.
+    first
+        Number of the first triangle of each part, and that of all triangles, (parts + 1,).
+    part
+        Index into ``parts`` of each triangle (n,).
+    vectors
+        `Part.area_vectors` of each triangle (n, 3).
+    zeros
+        `Part.zero` of each part (parts, 3).
+    together
+        Corners (n, 3, 3) of all triangles if there are more than `FEW_PARTS` parts.
     """
 
     parts: list[Part]
@@ -78,7 +102,7 @@ class Triangles(NamedTuple):
         return np.array([part.is_light for part in self.parts], bool)[self.part]
 
     def reach(self, numbers: Indices, corners: Array) -> Array:
-        """Largest coordinate (k,) of some triangles (k, 3, 3): their rounding is relative to it."""
+        """Largest coordinate (k,) of some triangles (k, 3, 3); their rounding is relative to it."""
         zeros = self.zeros[self.part[numbers]]
         both = np.maximum(np.abs(corners), np.abs(corners - zeros[:, None]))
         return np.asarray(both.max(axis=(1, 2), initial=0))
@@ -93,9 +117,16 @@ class Triangles(NamedTuple):
             corners[own] = part.triangles[numbers[own] - self.first[place]]
         return corners
 
+    def larger(self, pairs: Indices) -> tuple[Indices, Array]:
+        """The larger triangle (k,) of each pair (k, 2), and its unit normal (k, 3)."""
+        areas = np.linalg.norm(self.vectors[pairs], axis=2)
+        rows, larger = np.arange(len(pairs)), areas.argmax(axis=1)
+        numbers = pairs[rows, larger]
+        return numbers, self.vectors[numbers] / areas[rows, larger, None]
+
 
 def all_triangles(parts: list[Part]) -> Triangles:
-    """The triangles of the meshes among parts that are not merged yet."""
+    """The triangles of all meshes among the parts, before any are merged."""
     meshes = [part for part in parts if isinstance(part.shape, Mesh)]
     counts = [len(part.primitives) for part in meshes]
     many = len(meshes) > FEW_PARTS
@@ -132,20 +163,16 @@ def _part(number: int, shape: Shape, origin: Array) -> Part:
 
 
 def _is_float32(numbers: Array) -> bool:
-    """Whether numbers have been rounded to float32, as those of many mesh files are."""
+    """Whether all numbers fit float32, as those of many mesh files do."""
     return bool((numbers.astype(np.float32) == numbers).all())
 
 
 def origin_of(shapes: tuple[Shape, ...]) -> Array:
-    """Centre of the shapes on a grid as coarse as their extent: 0 where they are near enough.
+    """Centre (3,) of the shapes, rounded to a grid as coarse as their extent: 0 if they are near 0.
 
-    Relative to it, float32 resolves the shapes however far they stand from the scene's own origin.
+    Relative to it, float32 resolves the shapes however far they are from the scene's own origin.
     """
-    spheres = [(*shape.center, shape.radius) for shape in shapes if isinstance(shape, Sphere)]
-    centers, radii = np.split(np.array(spheres).reshape(-1, 4), [3], axis=1)
-    meshes = [shape.vertices for shape in shapes if isinstance(shape, Mesh)]
-    low = np.vstack([centers - radii, *(mesh.min(axis=0) for mesh in meshes)]).min(axis=0)
-    high = np.vstack([centers + radii, *(mesh.max(axis=0) for mesh in meshes)]).max(axis=0)
+    low, high = bounds(shapes)
     extent = np.linalg.norm(high - low)
     if extent == 0:
         return np.asarray(low)

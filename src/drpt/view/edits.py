@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from drpt.scene import Camera, Diffuse, Mesh, Phong, Scene, SceneError, Sphere
+from drpt.scene import Camera, Diffuse, Phong, Scene, SceneError, Sphere
+from drpt.scene.bounds import bounds
 from drpt.scene.checks import refuse
 from drpt.view.state import Orbit
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from drpt.scene import Shape
     from drpt.scene.checks import Point
     from drpt.scene.model import Material
-
-    _Box: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 OF_SPHERES = ("center", "radius")
 OF_SURFACES = ("albedo", "exponent")
@@ -98,27 +97,14 @@ def _depth(scene: Scene, forward: NDArray[np.float64]) -> float:
     What holds the eye, such as a sky, is left out if there is anything else.
     """
     eye = scene.camera.eye
-    boxes = [_box(shape) for shape in scene.shapes]
-    outside = [box for box in boxes if (eye < box[0]).any() or (eye > box[1]).any()]
-    low, high = _around(outside or boxes)
+    outside = [
+        shape
+        for shape, (low, high) in ((shape, bounds([shape])) for shape in scene.shapes)
+        if (eye < low).any() or (eye > high).any()
+    ]
+    low, high = bounds(outside or scene.shapes)
     depth = float(((low + high) / 2 - scene.camera.eye) @ forward)
     return max(depth, NEAR * float(np.linalg.norm(high - low)))
-
-
-def bounding_box(scene: Scene) -> _Box:
-    """Return the least and the greatest corner (3,) of a box around all shapes."""
-    return _around([_box(shape) for shape in scene.shapes])
-
-
-def _around(boxes: list[_Box]) -> _Box:
-    lows, highs = zip(*boxes, strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
-
-
-def _box(shape: Shape) -> _Box:
-    if isinstance(shape, Mesh):
-        return shape.vertices.min(axis=0), shape.vertices.max(axis=0)
-    return np.subtract(shape.center, shape.radius), np.add(shape.center, shape.radius)
 
 
 def _point(vector: NDArray[np.float64]) -> Point:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drpt.kernel.recording import NONE
-from drpt.view.edits import bounding_box
+from drpt.scene.bounds import bounds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,7 +57,7 @@ def _ends(scene: Scene, vertices: Vertices) -> Array:
 
 
 def _size(scene: Scene) -> float:
-    low, high = bounding_box(scene)
+    low, high = bounds(scene.shapes)
     return float(np.linalg.norm(high - low))
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.nearby import close_pairs
-from drpt.kernel.triangle_pairs import overlap_width, separation
+from drpt.kernel.overlaps.nearby import close_pairs
+from drpt.kernel.overlaps.triangle_pairs import overlap_width, separation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,31 +19,31 @@ if TYPE_CHECKING:
     Mask: TypeAlias = NDArray[np.bool_]
 
 SAME_PLACE = 2.0**-22
-"""Surfaces are in one plane if they differ by no more than this, relative to their coordinates.
+"""Largest distance between two surfaces in one plane, relative to their coordinates.
 
 Rounding the corners of two triangles to float32 moves their planes apart by up to four times 2⁻²⁴.
-What is farther apart keeps its order on the device, up to `intersect.SPAWN_OFFSET`.
+Surfaces that are farther apart keep their order on the device, up to `intersect.SPAWN_OFFSET`.
 """
 ROUNDING = 2.0**-22
-"""How far the corners of a triangle may be off its plane, relative to its coordinates, over its
-size: by how much its normal may be turned. Some roundings to float32, for triangles that are
-longer than high."""
+"""Largest distance of a triangle's corners from its exact plane, relative to its coordinates: four
+roundings to float32, for triangles that are longer than high. Divided by the triangle's size, it
+bounds the angle by which rounding turns the normal."""
 BESIDE = np.array([1.1, 1.3, 1.7])
-"""Where a point beside the scene is, over the scene's largest coordinate."""
+"""A point outside the scene, in units of the scene's largest coordinate."""
 LARGE = 2**14
-"""Of meshes with more triangles, only those that are near others are compared with them."""
+"""In a mesh with more triangles than this, only those near other meshes are compared."""
 FEW_OTHERS = 2**10
-"""Where others are no more than this, only those triangles of a large mesh are compared that are in
-a plane of theirs; else those in the box around them."""
+"""If a large mesh has no more other triangles around it than this, only its triangles in one of
+their planes are compared; otherwise those in the box around the others."""
 DIGITS = 9
-"""Planes that are the same in this many digits are looked at once."""
+"""Planes that agree to this many digits are tested once."""
 
 
 class _Planes(NamedTuple):
-    """Planes of triangles: unit normals (n, 3), offsets (n,), and by how much both may be off.
+    """Planes of triangles: unit normals (n, 3), offsets (n,), and their tolerances (n,).
 
-    Within the scene, a point of a triangle is no farther from the plane of another one that it lies
-    on than that one's ``tolerance`` (n,).
+    A point of the scene in the exact plane of a triangle is no farther from the computed plane than
+    that triangle's ``tolerance``.
     """
 
     normals: Array
@@ -66,7 +66,7 @@ def coplanar_pairs(triangles: Triangles, groups: Indices) -> Indices:
 
 
 def _screened(triangles: Triangles, groups: Indices, sizes: Array) -> Indices:
-    """Numbers of the triangles that are compared: of large meshes only some."""
+    """Numbers of the triangles that are compared: all but some of large meshes."""
     kept = np.ones(len(groups), bool)
     for place in np.flatnonzero(np.diff(triangles.first) > LARGE).tolist():
         start, stop = triangles.first[place : place + 2]
@@ -77,7 +77,7 @@ def _screened(triangles: Triangles, groups: Indices, sizes: Array) -> Indices:
 
 
 def _near(triangles: Triangles, place: int, others: Indices, sizes: Array) -> Mask:
-    """Which triangles of a mesh may be in one plane with some of the others."""
+    """Which triangles of a mesh may be in one plane with one of the others."""
     part = triangles.parts[place]
     if len(others) > FEW_OTHERS:
         low, high = _boxes(triangles, others)
@@ -92,7 +92,7 @@ def _near(triangles: Triangles, place: int, others: Indices, sizes: Array) -> Ma
 
 
 def _all_corners(faces: NDArray[np.int32], masks: list[Mask]) -> Mask:
-    """Which triangles have all of their corners in one of some sets of points."""
+    """Which triangles (n, 3) have all corners in one of several sets of points, each a mask."""
     found = np.zeros(len(faces), bool)
     for mask in masks:
         if mask.any():
@@ -104,7 +104,7 @@ def _all_corners(faces: NDArray[np.int32], masks: list[Mask]) -> Mask:
 
 
 def _planes(triangles: Triangles, numbers: Indices, sizes: Array) -> _Planes:
-    """Planes of some triangles. The larger a triangle, the less its plane is turned by rounding."""
+    """Planes of some triangles. Rounding turns the plane of a large triangle less."""
     vectors, starts = triangles.vectors[numbers], triangles.corners(numbers)[:, 0]
     lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
     normals = vectors / lengths[:, None]
@@ -114,9 +114,9 @@ def _planes(triangles: Triangles, numbers: Indices, sizes: Array) -> _Planes:
 
 
 def _feet(triangles: Triangles, numbers: Indices, sizes: Array) -> tuple[Array, Array]:
-    """A point (n, 3) that stands for the plane of each triangle, and its tolerances (n,).
+    """A point (n, 3) that identifies the plane of each triangle, and its tolerance (n,).
 
-    It is the plane's nearest point to a point beside the scene, relative to that: unlike normals it
+    It is the foot of the perpendicular from `BESIDE`, relative to that point. Unlike the normal, it
     is the same for triangles that face opposite ways.
     """
     normals, offsets, tolerance = _planes(triangles, numbers, sizes)
@@ -125,24 +125,22 @@ def _feet(triangles: Triangles, numbers: Indices, sizes: Array) -> tuple[Array, 
 
 
 def _size(part: Part) -> float:
-    """Largest coordinate of a mesh' part, also as its numbers were given."""
+    """Largest coordinate of a mesh, relative to the kernels' origin and to that of its file."""
     return float(np.abs(part.points).max(initial=0) + np.abs(part.zero).max())
 
 
 def _boxes(triangles: Triangles, numbers: Indices) -> tuple[Array, Array]:
-    """Boxes around some triangles, which intersect where those touch each other."""
+    """Boxes around some triangles, padded so that boxes of touching triangles intersect."""
     corners = triangles.corners(numbers)
     room = SAME_PLACE * triangles.reach(numbers, corners)[:, None]
     return corners.min(axis=1) - room, corners.max(axis=1) + room
 
 
 def _overlapping(triangles: Triangles, pairs: Indices) -> Indices:
-    """Those of pairs of triangles that are in one plane and have an area in common."""
+    """Select the pairs of triangles that are in one plane and share an area."""
     corners = triangles.corners(pairs.ravel()).reshape(-1, 2, 3, 3)
     reach = [triangles.reach(pairs[:, i], corners[:, i]) for i in range(2)]
     tolerance = SAME_PLACE * np.minimum(*reach)
-    areas = np.linalg.norm(triangles.vectors[pairs], axis=2)
-    rows, larger = np.arange(len(pairs)), areas.argmax(axis=1)
-    normals = triangles.vectors[pairs[rows, larger]] / areas[rows, larger, None]
+    _, normals = triangles.larger(pairs)
     one_plane = separation(corners, normals) <= tolerance
     return pairs[one_plane & (overlap_width(corners) > tolerance)]

@@ -1,4 +1,4 @@
-"""Meshes of which the areas that others cover are cut away (host)."""
+"""Cuts the areas that later surfaces cover away from meshes (host)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.clipping import fan, subtract, widen
-from drpt.kernel.coplanar import SAME_PLACE
 from drpt.kernel.facets import area_vectors, has_area, merge_coplanar
+from drpt.kernel.overlaps.clipping import fan, subtract, widen
+from drpt.kernel.overlaps.coplanar import SAME_PLACE
 from drpt.kernel.parts import NO_TRIANGLES, Part
 
 if TYPE_CHECKING:
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     Indices: TypeAlias = NDArray[np.intp]
 
 MERGE_LIMIT = 256
-"""Up to this many triangles that overlap are merged into convex polygons before they are cut."""
+"""Up to this many overlapping triangles are merged into convex polygons before they are cut."""
 DIGITS = 7
-"""Triangles are in one plane where their planes are the same in this many digits: those of
-different sheets differ by more, see `SAME_PLACE`."""
+"""Triangles whose planes agree to this many digits are merged. Planes that are not the same differ
+by more, see `SAME_PLACE`."""
 
 
 def cut_parts(parts: list[Part], triangles: Triangles, pairs: Indices) -> list[Part]:
@@ -60,7 +60,7 @@ def _cut_part(triangles: Triangles, part: Part, place: int, pairs: Indices) -> P
 
 
 def _merged_pieces(triangles: Triangles, pairs: Indices) -> list[Array]:
-    """Triangles (m, 3, 3) that are left of flat ones; those in one plane are cut as polygons."""
+    """Remaining triangles (m, 3, 3) of flat ones; those in one plane are cut as polygons."""
     corners, vectors = triangles.corners(pairs[:, 0]), triangles.vectors[pairs[:, 0]]
     normals = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     offsets = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.abs(corners).max()
@@ -76,14 +76,14 @@ def _merged_pieces(triangles: Triangles, pairs: Indices) -> list[Array]:
 
 
 def _uncovered(polygon: Array, covers: list[Array]) -> Array:
-    """Triangles (m, 3, 3) that are left of a polygon."""
+    """Triangles (m, 3, 3) of the part of a polygon that no cover hides."""
     overlap = SAME_PLACE * np.abs(polygon).max()
     pieces = subtract(polygon, covers, overlap)
     return np.concatenate([NO_TRIANGLES, *(fan(widen(piece, overlap)) for piece in pieces)])
 
 
 def _interpolated(corners: Array, normals: Array, pieces: Array) -> Array:
-    """Normals at the corners of pieces (m, 3, 3) of a triangle: mixed, and not of unit length."""
+    """Interpolated normals (m, 3, 3), not of unit length, at the corners of a triangle's pieces."""
     a, b, c = corners
     basis = np.stack([b - a, c - a, np.cross(b - a, c - a)], axis=1)
     weights = np.linalg.solve(basis, (pieces - a).reshape(-1, 3).T).T

@@ -1,11 +1,11 @@
-"""Shapes that overlap in one plane: of each two the later one is seen (host).
+"""The rule for shapes that overlap in one plane: the later one is seen (host).
 
-Two surfaces in one place leave it to rounding which of them a ray meets. So before any layout is
-made of the shapes, what a later shape covers is cut away from an earlier one, and of spheres that
-are the same the last one is kept.
+Without a rule, rounding would decide which of two surfaces in one place a ray hits. Before the
+shapes are laid out, the area that a later shape covers is cut away from the earlier one. Of equal
+spheres, the last one is kept.
 
-A light is cut like any surface, but cuts away nothing from a surface that reflects: its front is
-seen before that, and its back is not seen (`intersect.COINCIDENT`). Lights that face opposite ways
+A light is cut like any surface, but does not cut a surface that reflects: the light's front wins
+against it, and its back is invisible (`intersect.COINCIDENT`). Two lights that face opposite ways
 are both kept. Lights that are the same triangle or sphere add up, see `primitives`.
 
 Nothing is cut where it makes no difference: between surfaces of the same material, and where both
@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.coplanar import SAME_PLACE, coplanar_pairs
-from drpt.kernel.cutting import cut_parts
-from drpt.kernel.darkness import dark_on_both_sides
-from drpt.kernel.nearby import close_pairs
+from drpt.kernel.overlaps.coplanar import SAME_PLACE, coplanar_pairs
+from drpt.kernel.overlaps.cutting import cut_parts
+from drpt.kernel.overlaps.darkness import dark_on_both_sides
+from drpt.kernel.overlaps.nearby import close_pairs
 from drpt.kernel.parts import all_triangles
 from drpt.scene import Mesh, Sphere
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     Mask: TypeAlias = NDArray[np.bool_]
 
 SHOWN = 3
-"""Pairs of shapes that a warning names; it counts the others."""
+"""Number of pairs of shapes that a warning names. It counts the others."""
 
 
 class Overlap(NamedTuple):
@@ -51,7 +51,7 @@ class Overlap(NamedTuple):
 
 
 class Resolved(NamedTuple):
-    """Parts of which no two surfaces are in one place, and what has been cut for that."""
+    """Parts without overlaps, and the overlaps that were cut."""
 
     parts: list[Part]
     overlaps: tuple[Overlap, ...] = ()
@@ -65,7 +65,7 @@ def warning_of(overlaps: tuple[Overlap, ...]) -> str:
 
 
 def resolve_overlaps(parts: list[Part]) -> Resolved:
-    """Cut what later shapes cover away from earlier ones."""
+    """Cut the areas that later shapes cover away from earlier ones."""
     parts, same_spheres = _without_covered_spheres(parts)
     triangles = all_triangles(parts)
     pairs = _overlapping_triangles(triangles)
@@ -83,19 +83,19 @@ def _unique_overlaps(numbers: Indices) -> list[Overlap]:
 
 
 def _look(shape: Shape) -> object:
-    """What tells shapes apart by sight: interpolated normals are those of a mesh alone."""
+    """The visible properties of a shape; no two meshes with normals look the same."""
     smooth = isinstance(shape, Mesh) and shape.normals is not None
     return (shape.material, shape.radiance, id(shape) if smooth else 0)
 
 
 def _looks(parts: list[Part]) -> Indices:
-    """The number of each part's look (n,)."""
+    """Number of the look of each part (n,)."""
     known: dict[object, int] = {}
     return np.array([known.setdefault(_look(part.shape), len(known)) for part in parts], np.intp)
 
 
 def _without_covered_spheres(parts: list[Part]) -> tuple[list[Part], list[Overlap]]:
-    """Leave out spheres in whose place there is a later one."""
+    """Leave out spheres that coincide with a later one."""
     spheres = [part for part in parts if isinstance(part.shape, Sphere)]
     looks = _looks(spheres)
     if len(set(looks.tolist())) < 2:
@@ -120,12 +120,12 @@ def _without_covered_spheres(parts: list[Part]) -> tuple[list[Part], list[Overla
 
 
 def _overlapping_triangles(triangles: Triangles) -> Indices:
-    """Pairs (k, 2) of triangles that overlap in one plane, the one to cut first."""
+    """Pairs (k, 2) of triangles that overlap in one plane; the first one is to be cut."""
     looks, light = _looks(triangles.parts), triangles.light
     if len(set(looks.tolist())) < 2 and light.sum() < 2:
         return np.empty((0, 2), np.intp)
     groups = looks[triangles.part]
-    alone = np.flatnonzero(light)  # the triangles of a light may cover each other
+    alone = np.flatnonzero(light)  # triangles of one light may overlap
     groups[alone] = len(looks) + alone
     pairs = coplanar_pairs(triangles, groups)
     first, second = light[pairs].T
@@ -134,7 +134,7 @@ def _overlapping_triangles(triangles: Triangles) -> Indices:
 
 
 def _add_up(triangles: Triangles, pairs: Indices) -> Mask:
-    """Whether pairs are of lights that face opposite ways, or are one and the same triangle."""
+    """Whether both of a pair are lights that face opposite ways or are the same triangle."""
     light = triangles.light[pairs]
     corners = triangles.corners(pairs.ravel()).reshape(-1, 2, 3, 3)
     first, second = triangles.vectors[pairs].swapaxes(0, 1)

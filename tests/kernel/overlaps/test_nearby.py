@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from drpt.kernel.nearby import box_pairs, close_pairs
+from drpt.kernel.overlaps.nearby import box_pairs, close_pairs
 
 
 def pairs_of(array: np.ndarray) -> set[tuple[int, ...]]:

@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     Array: TypeAlias = NDArray[np.float64]
 
 INSIDE = 1e-9
-"""Barycentric coordinates of a point that is in a triangle are no less than minus this: some points
-too many just outside change nothing, but corners of the common area must not be lost."""
+"""A point is in a triangle if no barycentric coordinate is below minus this. Points just outside do
+no harm, but no corner of the common area may be lost."""
 
 
 def overlap_width(corners: Array) -> Array:
-    """Least width (k,) of what pairs of triangles (k, 2, 3, 3) in one plane have in common.
+    """Width (k,) of the common area of pairs of triangles (k, 2, 3, 3) in one plane.
 
-    More exactly, how far one triangle reaches over an edge of the other, for the edge where that is
-    least; not above 0 where they have nothing in common.
+    It is the smallest distance by which one triangle reaches over an edge of the other; 0 or less
+    if the triangles share no area.
     """
     return np.minimum(_reach_over_edges(corners), _reach_over_edges(corners[:, ::-1]))
 
@@ -38,8 +38,8 @@ def _reach_over_edges(corners: Array) -> Array:
 def separation(corners: Array, normals: Array) -> Array:
     """Greatest distance (k,) between pairs of triangles (k, 2, 3, 3) where they overlap.
 
-    It is measured along unit normals (k, 3), and greatest at a corner of the common area: a corner
-    of one triangle in the other, or a crossing of two edges. Infinite where nothing is in common.
+    It is measured along unit normals (k, 3), and is greatest at a corner of the common area: a
+    corner of one triangle in the other, or a crossing of two edges. Infinite without a common area.
     """
     heights = np.einsum("kicx,kx->kic", corners - corners[:, :1, :1], normals)
     flat = _projected(corners, normals)
@@ -62,7 +62,7 @@ def _projected(corners: Array, normals: Array) -> Array:
 
 
 def _gaps_at_corners(flat: Array, heights: Array) -> Array:
-    """Distances (k, 3) of the first triangle's corners from the second; -1 where not above it."""
+    """Distances (k, 3) of the first triangle's corners from the second; -1 outside of it."""
     (point, (a, b, c)) = flat[:, 0], np.moveaxis(flat[:, 1, :, None], 1, 0)
     area = _cross(b - a, c - a)
     area = np.where(area == 0, np.nan, area)
@@ -73,7 +73,7 @@ def _gaps_at_corners(flat: Array, heights: Array) -> Array:
 
 
 def _gaps_at_crossings(flat: Array, heights: Array) -> Array:
-    """Distances (k, 9) of edges of the two triangles where they cross; -1 where they do not."""
+    """Distances (k, 9) of the two triangles where their edges cross; -1 if they do not."""
     start, other = flat[:, 0, :, None], flat[:, 1, None]
     along = np.roll(start, -1, axis=1) - start
     other_along = np.roll(other, -1, axis=2) - other

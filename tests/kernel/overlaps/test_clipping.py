@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from drpt.kernel.clipping import fan, subtract, widen
 from drpt.kernel.facets import area_normal
+from drpt.kernel.overlaps.clipping import fan, subtract, widen
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 

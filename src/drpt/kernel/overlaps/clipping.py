@@ -1,8 +1,7 @@
-"""Convex polygons of a plane, and what of them others leave over (host).
+"""Differences of convex polygons in a plane (host).
 
-To subtract a convex polygon, what is outside of its first edge is cut off, of the rest what is
-outside of the second, and so on: each of these pieces is convex, and what is left in the end is
-covered.
+To subtract a convex polygon, the part outside its first edge is cut off; from the rest, the part
+outside the second edge, and so on. Each of these pieces is convex, and the last rest is covered.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ if TYPE_CHECKING:
     Edge: TypeAlias = tuple[tuple[float, ...], tuple[float, ...]]
 
 ON_EDGE = 2.0**-42
-"""Points are on an edge if they are no farther from it, relative to the coordinates: some hundred
-roundings in float64, for cuts that start from cuts."""
+"""Largest distance from an edge of a point on it, relative to the coordinates: 2¹⁰ roundings in
+float64, as pieces are cut again."""
 LONGEST_MITRE = 4.0
-"""A corner of a widened polygon moves by this many times the width at the most."""
+"""Largest displacement of a corner of a widened polygon, in units of the width."""
 
 
 class HalfPlane(NamedTuple):
-    """The points whose product with ``inward`` is at least ``level``."""
+    """The points whose dot product with ``inward`` (3,) is at least ``level``."""
 
     inward: Array
     level: float
@@ -38,8 +37,8 @@ class HalfPlane(NamedTuple):
 def subtract(polygon: Array, others: Iterable[Array], overlap: float) -> list[Array]:
     """Convex pieces (k, 3) of a convex polygon outside of convex ``others`` in the same plane.
 
-    The pieces reach under the others' common border by the width ``overlap``, except along edges
-    that are the polygon's own: so there is no gap between a piece and what covers the rest.
+    The pieces reach under the outer border of the others by the width ``overlap``, except along the
+    polygon's own edges, so that no gap opens between a piece and the polygons that cover the rest.
     """
     normal, size = unit_normal(polygon), np.abs(polygon).max()
     turned = [other if unit_normal(other) @ normal > 0 else other[::-1] for other in others]
@@ -57,7 +56,7 @@ def subtract(polygon: Array, others: Iterable[Array], overlap: float) -> list[Ar
 def widen(polygon: Array, width: float) -> Array:
     """A convex polygon (k, 3) whose edges are moved outward by a width.
 
-    At corners so sharp that they would go too far they are cut off.
+    Sharp corners move no farther than `LONGEST_MITRE` widths.
     """
     normal = unit_normal(polygon)
     ahead = np.roll(polygon, -1, axis=0) - polygon
@@ -80,9 +79,10 @@ def _edges(polygon: Array) -> list[Edge]:
 
 
 def _half_plane(edge: Edge, normal: Array, room: float) -> HalfPlane:
-    """What is on the left of an edge by some room at least.
+    """The half-plane on the left of an edge, at least at a distance ``room`` from it.
 
-    The same edge of a neighbour, run the other way, gives the same numbers with opposite signs.
+    A neighbour has the same edge in the other direction, and gets the same numbers with opposite
+    signs.
     """
     low, high = sorted(edge)
     inward = np.cross(normal, np.subtract(high, low))
@@ -92,7 +92,7 @@ def _half_plane(edge: Edge, normal: Array, room: float) -> HalfPlane:
 
 
 def _outside(piece: Array, planes: list[HalfPlane], slack: float) -> Iterator[Array]:
-    """Pieces of what is not in all of the half-planes; the whole piece if they do not touch it."""
+    """Parts of a piece outside the common area of half-planes; all of it if it is disjoint."""
     rest, outer = piece, []
     for plane in planes:
         heights = rest @ plane.inward - plane.level
@@ -107,7 +107,7 @@ def _outside(piece: Array, planes: list[HalfPlane], slack: float) -> Iterator[Ar
 
 
 def _clip(polygon: Array, heights: Array) -> Array:
-    """What of a convex polygon is not below 0."""
+    """The part of a convex polygon (k, 3) where heights (k,) of its corners are at least 0."""
     corners = []
     for k in range(len(polygon)):
         here, there = heights[k - 1], heights[k]

@@ -1,6 +1,6 @@
-"""Pairs of things that are close to each other, among very many (host).
+"""Pairs of points or boxes that are close to each other, found among very many (host).
 
-Only pairs of different groups count: things of one group may be as close as they like at no cost.
+Only pairs of different groups are found. Pairs within a group cost no time, however close they are.
 """
 
 from __future__ import annotations
@@ -19,39 +19,39 @@ if TYPE_CHECKING:
     Boxes: TypeAlias = Callable[[Indices], tuple[Array, Array]]
 
 STEP = 16.0
-"""Ratio of the tolerances of two levels: points are compared in cells as large as theirs need."""
+"""Ratio of the tolerances of two levels. The size of cells follows the tolerances of a level."""
 CELL = 32.0
-"""Width of a cell over the largest tolerance in it: few points then stand so near to the border of
-a cell that they must be looked for in the next one, too."""
+"""Width of a cell over the largest tolerance in it. Points near the border of a cell belong to the
+next cell, too; with this width they are few."""
 PRIMES = np.array([73856093, 19349663, 83492791, 39916801])
 """Factors of a hash of cells (Teschner et al. 2003, "Optimized Spatial Hashing for Collision
 Detection of Deformable Objects"; one more for a fourth coordinate)."""
 FEW = 32
-"""So many things are compared each with each."""
+"""Up to this number, all pairs are compared."""
 PROGRESS = 1.5
-"""A set of boxes is halved only where both halves together have at most so many times its boxes."""
+"""A set of boxes is halved only if both halves together have at most this many times its boxes."""
 
 
 class _Cells(NamedTuple):
-    """Points by cell: their numbers, and the number of the cell, both (m,); equal cells adjoin."""
+    """Points sorted by cell: their numbers, and the numbers of their cells, both (m,)."""
 
     members: Indices
     cells: Indices
 
 
 def close_pairs(points: Array, tolerances: Array, groups: Indices, boxes: Boxes) -> Indices:
-    """Pairs (k, 2) of points (n, d) that may be one: none is missed, few are too many.
+    """Pairs (k, 2) of points (n, d) that may coincide; no pair is missed, few are superfluous.
 
     Parameters
     ----------
     points, tolerances
-        Two points may be one if they differ by no more than the sum of their tolerances (n,) in
+        Two points may coincide if they differ by no more than the sum of their tolerances (n,) in
         each coordinate; d is 4 at most.
     groups
         The number of the group (n,) of each point; the points of a pair are of different groups.
     boxes
-        Lowest and highest corners (m, 3) of boxes around the things that have some of the points;
-        those of a pair intersect.
+        Function that returns the lowest and the highest corners (m, 3) of boxes around the objects
+        that some of the points stand for. The boxes of a pair intersect.
     """
     found = [np.empty((0, 2), np.intp)]
     for members, cells in _crowded_cells(points, tolerances, groups):
@@ -84,7 +84,7 @@ def box_pairs(low: Array, high: Array, groups: Indices) -> Indices:
 def _crowded_cells(points: Array, tolerances: Array, groups: Indices) -> Iterator[_Cells]:
     """Cells with points of several groups, on each level of tolerances.
 
-    Points are compared with those of their own level and of finer ones.
+    A level contains its own points and those of finer levels.
     """
     coarsest = tolerances.max()
     levels = np.floor(np.log(coarsest / tolerances) / np.log(STEP)).astype(np.intp)
@@ -130,7 +130,7 @@ def _sorted_by_cell(points: Array) -> _Cells:
 
 
 def _pairs_in_cells(members: Indices, cells: Indices) -> Indices:
-    """All pairs of members of the same cell."""
+    """All pairs (k, 2) of members of the same cell."""
     found = [np.empty((0, 2), np.intp)]
     for ahead in range(1, len(members)):
         same = np.flatnonzero(cells[ahead:] == cells[:-ahead])
@@ -141,7 +141,7 @@ def _pairs_in_cells(members: Indices, cells: Indices) -> Indices:
 
 
 def _halves(low: Array, high: Array) -> tuple[Indices, Indices] | None:
-    """Boxes on either side of a plane across an axis; None where most are on both sides."""
+    """Boxes on either side of a plane across an axis; None if most are on both sides."""
     middles = (low + high) / 2
     for axis in np.argsort(-np.ptp(middles, axis=0)):
         cut = np.median(middles[:, axis])

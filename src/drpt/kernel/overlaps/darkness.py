@@ -1,7 +1,7 @@
-"""Where two surfaces are in one plane: whether light can reach either side of it (host).
+"""Whether light can reach either side of a plane in which two surfaces overlap (host).
 
-A side is dark in a closed body with no light inside, and where nothing of the scene is on that side
-of the plane. Whatever a camera sees there is black, wherever it stands.
+A side is dark inside a closed body without a light, and where no part of the scene is on that side
+of the plane. A camera sees black there, wherever it stands.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from drpt.kernel.overlaps.coplanar import SAME_PLACE
 from drpt.scene import Mesh
 
 if TYPE_CHECKING:
@@ -21,19 +22,20 @@ if TYPE_CHECKING:
     Indices: TypeAlias = NDArray[np.intp]
     Mask: TypeAlias = NDArray[np.bool_]
 
-NEAR = 2.0**-22
-"""How far from a plane, relative to the scene's coordinates, is not beyond it: as in `overlaps`."""
+NEAR = SAME_PLACE
+"""A point is beyond a plane only if it is farther from it than this, relative to the scene's
+coordinates."""
 PLANES = 256
-"""Up to this many planes are looked at; beyond any others there is taken to be something."""
+"""Number of planes that are tested. Something is assumed to be beyond all others."""
 DIGITS = 6
-"""Planes that are the same in so many digits are looked at once."""
+"""Planes that agree to this many digits are tested once."""
 
 
 def dark_on_both_sides(parts: list[Part], triangles: Triangles, pairs: Indices) -> Mask:
-    """Whether no light reaches pairs (k, 2) of triangles in one plane: then no picture shows them.
+    """Whether no light reaches pairs (k, 2) of triangles in one plane, so no picture shows them.
 
-    One side at least must be inside of a closed body, which is a part of a mesh whose edges are
-    each shared by two of its triangles.
+    At least one side must be inside a closed body: a connected part of a mesh each of whose edges
+    is shared by two triangles.
     """
     planes = _planes(triangles, pairs)
     dark_above, dark_below = _nothing_beyond(parts, planes)
@@ -48,11 +50,7 @@ def dark_on_both_sides(parts: list[Part], triangles: Triangles, pairs: Indices) 
 
 def _planes(triangles: Triangles, pairs: Indices) -> Array:
     """Row (normal, offset) of the plane of each pair: that of the larger triangle."""
-    areas = np.linalg.norm(triangles.vectors[pairs], axis=2)
-    rows = np.arange(len(pairs))
-    larger = areas.argmax(axis=1)
-    numbers = pairs[rows, larger]
-    normals = triangles.vectors[numbers] / areas[rows, larger, None]
+    numbers, normals = triangles.larger(pairs)
     offsets = np.einsum("kx,kx->k", normals, triangles.corners(numbers)[:, 0])
     return np.column_stack([normals, offsets])
 
@@ -72,7 +70,7 @@ def _nothing_beyond(parts: list[Part], planes: Array) -> tuple[Mask, Mask]:
 
 
 def _balls(parts: list[Part]) -> tuple[Array, Array]:
-    """Centres (n, 3) and radii (n,) of balls that the parts are the convex hulls of."""
+    """Centres (n, 3) and radii (n,) of balls with the same convex hull as the parts."""
     meshes = [part.triangles.reshape(-1, 3) for part in parts if isinstance(part.shape, Mesh)]
     spheres = [part.primitives for part in parts if not isinstance(part.shape, Mesh)]
     rows = np.concatenate([np.empty((0, 4)), *spheres])
@@ -81,10 +79,9 @@ def _balls(parts: list[Part]) -> tuple[Array, Array]:
 
 
 def _inner_sides(parts: list[Part], triangles: Triangles, places: Indices) -> Indices:
-    """On which side of each triangle (n,) it is dark since that is the inside of a closed body.
+    """The dark side of each triangle (n,), where a closed body has it inside.
 
-    1 where its front is, -1 where its back is, 0 for none. Triangles of the parts at other places
-    have 0.
+    1 is the front, -1 the back, 0 neither. Triangles of parts that are not at ``places`` have 0.
     """
     inner = np.zeros(len(triangles.part), np.intp)
     numbers = np.flatnonzero(np.isin(triangles.part, places))
@@ -99,8 +96,8 @@ def _inner_sides(parts: list[Part], triangles: Triangles, places: Indices) -> In
 
 
 def _closed_bodies(corners: Array, part: Indices) -> tuple[Mask, Indices]:
-    """Whether each triangle (n, 3, 3) is of a closed body, and the number of its body."""
-    from scipy.sparse import coo_array  # it takes a while, and few scenes need it
+    """Whether each triangle (n, 3, 3) belongs to a closed body, and the number of its body."""
+    from scipy.sparse import coo_array  # the import is slow, and few scenes need it
     from scipy.sparse.csgraph import connected_components
 
     points = np.column_stack([np.repeat(part, 3), corners.reshape(-1, 3)])
@@ -119,7 +116,7 @@ def _closed_bodies(corners: Array, part: Indices) -> tuple[Mask, Indices]:
 def _holds_light(
     parts: list[Part], meshes: list[Part], corners: Array, part: Indices, body: Indices
 ) -> Mask:
-    """Whether a light other than itself reaches into the box around each triangle's body."""
+    """Whether the box around each triangle's body intersects that of a light of another shape."""
     count = body.max(initial=-1) + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, body, corners.min(axis=1))
