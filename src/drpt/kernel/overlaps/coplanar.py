@@ -126,7 +126,9 @@ def _feet(triangles: Triangles, numbers: Indices, sizes: Array) -> tuple[Array, 
 
 def _size(part: Part) -> float:
     """Largest coordinate of a mesh, relative to the kernels' origin and to that of its file."""
-    return float(np.abs(part.points).max(initial=0) + np.abs(part.zero).max())
+    points = part.points
+    largest = max(points.max(initial=0), -points.min(initial=0))  # `abs` would copy them
+    return float(largest + np.abs(part.zero).max())
 
 
 def _boxes(triangles: Triangles, numbers: Indices) -> tuple[Array, Array]:
