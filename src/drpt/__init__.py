@@ -4,8 +4,8 @@ import sys
 from os.path import basename
 
 if basename("".join(sys.orig_argv[-len(sys.argv) :][:1])) in ("drpt", "drpt-render", "-mdrpt"):
-    # This is the program. From here on Ctrl-C ends it at once, without a traceback of its imports;
-    # `drpt.cli` catches it later. Python's own `signal` takes milliseconds to be imported.
+    # This process is the command. Until `drpt.cli` handles Ctrl-C, it ends the process at once,
+    # without a traceback of the imports. Importing Python's `signal` would take milliseconds.
     import _signal  # type: ignore[import-not-found]
 
     if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:

@@ -1,4 +1,4 @@
-"""Why a picture is black: the reason in one line, by what the camera sees and where lights face."""
+"""The reason why a picture is black, in one line."""
 
 from __future__ import annotations
 
@@ -17,21 +17,29 @@ if TYPE_CHECKING:
     from drpt.scene import Scene, Shape
 
 MAX_POINTS = 1024
-"""Points that lights are tested against, evenly spread over those that the camera sees."""
+"""Number of visible points that lights are tested against, evenly spread over the picture."""
 MAX_TRIANGLES = 4096
-"""Triangles that are tested at once, which bounds the memory to 32 MiB."""
+"""Number of triangles that are tested at once, so that the memory is 32 MiB at most."""
 ROUNDING = 1e-6
-"""Height above a plane, relative to the coordinates, up to which a point is in it."""
+"""Height above a plane, relative to the coordinates, up to which a point is in the plane."""
 SIDE = "a triangle emits on the side from which its vertices turn counter-clockwise"
 
 
 def black_because(scene: Scene, bounces: int, seen: Seen) -> str:
-    """Say why a picture of a scene is black; what is not certain is called likely."""
+    """Return why a picture of a scene is black; a reason that is not certain is called likely.
+
+    Parameters
+    ----------
+    scene, bounces
+        What was rendered.
+    seen
+        First hits of the camera's rays, see :func:`drpt.kernel.first_hit.first_seen`.
+    """
     return next(_reasons(scene, bounces, seen))
 
 
 def _reasons(scene: Scene, bounces: int, seen: Seen) -> Iterator[str]:
-    """Yield what keeps light from the camera: each reason takes those before it for excluded."""
+    """Yield possible reasons; each assumes that those before it do not hold."""
     shapes = dict(enumerate(scene.shapes))
     lights = [number for number, shape in shapes.items() if shape.is_light]
     in_sight = set(seen.shape[seen.shape >= 0].tolist())

@@ -1,4 +1,4 @@
-"""How fast the variance of a mean falls with its samples: by the factor ρ for twice as many."""
+"""Convergence rate: twice the samples divide the variance of their mean by a factor ρ."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ INDEPENDENT, SMOOTH = 2.0, 8.0
 LEAST = 1.8
 """Least ρ of a few pixels: less than `INDEPENDENT`, as estimates scatter to both sides of it."""  # noqa: RUF001
 PRIOR = 64
-"""Pixels' worth of belief in independent samples, which decides in the smallest pictures."""
+"""Weight, in pixels, of the prior that samples are independent; it matters in small pictures."""
 LEVEL_PRIOR = 1
-"""Pixels' worth of belief that samples of one level of noise are independent: rare ones are."""
+"""Weight, in pixels, of the prior that the samples of a noise level are independent."""
 TILE_PRIOR = 6
-"""Pixels' worth of belief that one tile has the ratio of all pixels of the level."""
+"""Weight, in pixels, of the prior that a tile has the ratio of its noise level."""
 TILE = 8
-"""Pixels along the sides of a tile."""
+"""Side of a tile in pixels."""
 
 
 def ratio(coarse: Array, fine: Array) -> float:
-    """ρ of a picture, from the squares of differences of one size and of half of it."""
+    """ρ of a picture, from the squared differences of blocks, (height, width, 3) each.
+
+    ``fine`` are those of blocks of half the size of ``coarse``.
+    """
     known = np.isfinite(coarse + fine)
     top, below = (float(np.sum(level, where=known)) / level.size for level in (coarse, fine))
     belief = PRIOR / coarse[..., 0].size * (top + below) / 2
@@ -37,18 +40,18 @@ def ratio(coarse: Array, fine: Array) -> float:
 
 
 def local_ratios(coarse: Array, fine: Array, whole: float) -> Array:
-    """ρ of each pixel (height, width), where ``whole`` is that of the picture.
+    """ρ of each pixel (height, width), where ``whole`` is ρ of the picture.
 
-    The edges of lights have another ρ than what they light, and much more noise. So ρ is estimated
-    for the pixels of each level of noise, a power of ten, and of each tile of the picture. Between
-    levels it is interpolated linearly.
+    Edges of lights have another ρ than lit surfaces, and much more noise. So ρ is estimated for
+    each noise level, a power of ten, within each tile of the picture, and interpolated linearly
+    between levels.
     """
     coarse, fine = coarse.sum(axis=2), fine.sum(axis=2)
     noise = combined(coarse, fine, whole)
     known = np.isfinite(noise) & (noise > 0)
     if not known.any():
         return np.full(noise.shape, whole)
-    noise[~known] = np.inf  # so that it counts for nothing
+    noise[~known] = np.inf  # so that its relative value is 0
     level = np.log10(noise, where=known, out=np.zeros_like(noise))
     tiles = _Tiles(level)
     top, below = (
@@ -62,14 +65,18 @@ def local_ratios(coarse: Array, fine: Array, whole: float) -> Array:
 
 
 def combined(coarse: Array, fine: Array, ratio: Array | float) -> Array:
-    """Squares of differences of the larger size, from both: there are two smaller ones for each."""
+    """Squared differences of the larger blocks, estimated from both sizes.
+
+    There are two differences of the smaller size for one of the larger.
+    """
     return (coarse + 2 * fine / ratio) / 3
 
 
 def fall(growth: float, ratio: Array | float) -> Array:
-    """Variance of the mean of a run and of what follows, over that of the mean of the run.
+    """Variance of the mean of a run and later samples together, over that of the mean of the run.
 
-    What follows is shorter than the run. The covariance of the means of two neighbouring runs is
+    ``growth`` is the ratio of both numbers of samples, from 1 to 2. The covariance of the means of
+    two neighbouring runs is
     v(run of both) − E[((A − B) / 2)²] = (2/ρ − 1) v(run).
     """
     rest, ratio = growth - 1, np.asarray(ratio)
@@ -78,12 +85,12 @@ def fall(growth: float, ratio: Array | float) -> Array:
 
 
 def _towards(prior: Array | float, top: Array, below: Array, pixels: float) -> Array:
-    """The ratio of sums of relative squares, with a belief of some pixels' worth in another."""
+    """Ratio of sums of relative squares, shrunk towards a prior that weighs as some pixels."""
     return (below + pixels * prior) / (top + pixels)
 
 
 class _Tiles:
-    """Squares of pixels, each with nodes at the whole levels that pixels (height, width) have."""
+    """Square tiles of pixels, each with a node at every integer noise level (height, width)."""
 
     def __init__(self, level: Array) -> None:
         height, width = level.shape
@@ -96,7 +103,7 @@ class _Tiles:
         self._lower = tile * self._shape[1] + lower.astype(np.int64)
 
     def sums(self, values: Array) -> Array:
-        """Sums (tiles, levels) of values of pixels, each shared by the levels around its own."""
+        """Sums (tiles, levels) of values of pixels, each split between the two nearest levels."""
         size, lower = self._shape[0] * self._shape[1], self._lower.ravel()
         upper_share = (values * self._part).ravel()
         total = np.bincount(lower, values.ravel() - upper_share, size)

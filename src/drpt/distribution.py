@@ -1,7 +1,7 @@
-"""The package as pip knows it: its name, its version, and how its extras are installed.
+"""The distribution that pip installs: its name, its version and its extras.
 
-The distribution is called `NAME`; the import and one of the commands are called ``drpt``. On PyPI
-``drpt`` is another project, which must never be advised.
+The distribution is called `NAME`. The import and one of the commands are called ``drpt``. On PyPI,
+``drpt`` is another project, so no message may advise to install it.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 NAME = "drpt-render"
-"""Of the distribution; ``pyproject.toml`` says the same."""
+"""Name of the distribution, as in ``pyproject.toml``."""
 VERSION = "0.1.0"
-"""Of the distribution, whose build reads it here: a look-up of metadata takes 20 ms."""
+"""Version of the distribution. The build reads it here; a look-up of metadata would take 20 ms."""
 EXTRAS = {
     "denoise": ("mitsuba-oidn",),
     "flip": ("flip-evaluator",),
     "notebook": ("ipywidgets",),
     "view": ("starlette", "uvicorn", "websockets"),
 }
-"""Optional features, and the distributions that each of them needs; as in ``pyproject.toml``."""
+"""Extras, and the distributions that each of them installs, as in ``pyproject.toml``."""
 
 
 def versions(*others: str) -> dict[str, str]:
@@ -39,10 +39,10 @@ def versions(*others: str) -> dict[str, str]:
 
 
 def install_command(extra: str = "", *options: str) -> str:
-    """Return the shell command that installs drpt again from where it came, with an extra.
+    """Return the shell command that installs drpt again, with an extra and options of pip.
 
-    pip records that source, unless it was an index (PEP 610): a folder is installed from there, an
-    archive or a repository by its URL. If the source is gone, the index is named.
+    pip records a source other than an index (PEP 610). The command installs from that folder or
+    URL, or from the index if there is no such record or the source is gone.
     """
     wanted = f"[{extra}]" if extra else ""
     url, in_place = _source()
@@ -59,7 +59,7 @@ def _pip_install(*arguments: str) -> str:
 
 
 def _source() -> tuple[str, bool]:
-    """URL that drpt was installed from, empty for an index, and whether it runs in place."""
+    """URL from which drpt was installed, empty for an index, and whether it is editable."""
     from importlib.metadata import PackageNotFoundError, distribution
 
     record = None

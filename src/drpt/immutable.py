@@ -1,8 +1,8 @@
 """Arrays that cannot be written to, and dataclasses whose arrays are always such.
 
-NumPy's flag ``writeable`` is no protection: whoever has an array that owns its memory can set it
-again, and a copy or an unpickled array has it set. So the memory here is that of a `bytes` object,
-of a class of its own: NumPy unpickles arrays into plain `bytes`, and lets them be written to.
+NumPy's flag ``writeable`` is no protection: it can be set again on an array that owns its memory,
+and it is set on copies and on unpickled arrays. So the memory here is that of a `bytes` object. The
+object has a class of its own, as NumPy unpickles arrays into plain `bytes` and allows writing.
 """
 
 from __future__ import annotations
@@ -31,10 +31,9 @@ class _Memory(bytes):
 
 
 class Immutable:
-    """Base of frozen dataclasses: their arrays are immutable, whatever made them.
+    """Base of frozen dataclasses whose arrays, also those in dictionaries, are immutable.
 
-    That holds for arrays in a dictionary, too. Copies and unpickled objects are made by the class,
-    from their fields.
+    Copies and unpickled objects are made by calling the class with the values of the fields.
     """
 
     def __post_init__(self) -> None:
@@ -46,7 +45,7 @@ class Immutable:
 
 
 def make(kind: type[_Class], values: dict[str, Any]) -> _Class:
-    """Make a dataclass from its fields: what `pickle` and `copy` call."""
+    """Make a dataclass from its fields; `pickle` and `copy` call this."""
     return kind(**values)
 
 

@@ -1,4 +1,4 @@
-"""Parts of messages: a message is one line of printable characters, whatever it tells of."""
+"""Texts in messages: each is made one line of printable characters, and not too long."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ _UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
 
 
 def one_line(text: str) -> str:
-    """Return a text as one line: white space as single spaces, what no terminal prints escaped."""
+    """Return a text as one line, with single spaces and unprintable characters escaped."""
     line = " ".join(text.split())
     if line.isprintable():
         return line
@@ -14,7 +14,7 @@ def one_line(text: str) -> str:
 
 
 def shortened(text: str, most: int) -> str:
-    """Return a text of at most ``most`` characters, whose middle is left out if it is longer."""
+    """Return a text of at most ``most`` characters; a longer one loses its middle."""
     if len(text) <= most:
         return text
     head = (most - 3) // 2
@@ -22,6 +22,6 @@ def shortened(text: str, most: int) -> str:
 
 
 def size_in_words(size: int) -> str:
-    """Return a number of bytes in decimal units, with four digits."""
+    """Return a number of bytes in decimal units, with four significant digits."""
     power = min((len(str(size)) - 1) // 3, len(_UNITS) - 1)
     return f"{size / 1000**power:.4g} {_UNITS[power]}"

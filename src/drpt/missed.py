@@ -1,8 +1,8 @@
-"""Light that the camera sees directly, but that the samples of a picture have missed.
+"""Directly visible light that the samples of a picture have missed.
 
-The edge of a light may cover a thousandth of a pixel. Before the first sample meets it, neither the
-picture nor its error tell of it. But camera rays alone are cheap, and where lights can be seen is
-known: so pixels before a light get many more of them than the picture has.
+The edge of a light may cover a thousandth of a pixel. Until the first sample hits it, it is missing
+from the picture and from its estimated error. Camera rays alone are cheap, and the pixels that may
+show a light are known. These pixels get many more camera rays than the picture has samples.
 """
 
 from __future__ import annotations
@@ -27,22 +27,24 @@ if TYPE_CHECKING:
     Project = Callable[[Array], Array]
 
 FACTOR = 64
-"""Camera rays through a pixel for each sample of the picture, at the most."""
+"""Largest number of camera rays through a pixel, per sample of a pixel of the picture."""
 SHARE = 0.25
-"""Camera rays of all pixels for each sample of the picture, at the most."""
+"""Largest number of camera rays of all pixels, per sample of the whole picture."""
 
 
 def missed(scene: Scene, image: Array, spp: int, project: Project, seen: Seen) -> float:
-    """What missed light adds to the relMSE of an image (height, width, 3).
+    """RelMSE that missed light adds to that of an image (height, width, 3).
 
     Parameters
     ----------
     scene, image, spp
-        What was rendered, the picture, and its samples per pixel.
+        The scene, its picture, and the samples per pixel of the picture.
     project
-        Where points (n, 3) are in the picture: x, y and depth, (n, 3); not a number behind the eye.
+        Function that projects points (n, 3) to x, y in pixels and depth, (n, 3); not a number for
+        points behind the eye.
     seen
-        Emission (pixels, 3) that some pixels see directly, by so many camera rays through each.
+        Function that returns the directly visible emission (pixels, 3) of a range of pixels, given
+        the number of camera rays per pixel.
     """
     pixels = image.reshape(-1, 3)
     before = np.flatnonzero(before_lights(scene, project))
@@ -56,20 +58,20 @@ def missed(scene: Scene, image: Array, spp: int, project: Project, seen: Seen) -
 
 
 def before_lights(scene: Scene, project: Project) -> NDArray[np.bool_]:
-    """Pixels (height, width) that may see a light, if nothing is before it."""
+    """Whether each pixel (height, width) may show a light, occlusion aside."""
     height, width = scene.camera.height, scene.camera.width
     mask = np.zeros((height, width), np.bool_)
     for shape in scene.shapes:
         if shape.is_light:
             x, y, _ = project(_hull(shape)).T
-            if np.isnan(x).any():  # a part of it is behind the eye
+            if np.isnan(x).any():  # part of the light is behind the eye
                 return np.ones_like(mask)
             mask[_pixels(y), _pixels(x)] = True
     return mask
 
 
 def _hull(shape: Shape) -> Array:
-    """Points (n, 3) whose convex hull holds a shape."""
+    """Points (n, 3) whose convex hull contains a shape."""
     if isinstance(shape, Sphere):
         corners = np.stack(np.meshgrid(*3 * [(-1.0, 1.0)]), axis=-1).reshape(-1, 3)
         return np.asarray(shape.center + shape.radius * corners)
@@ -77,13 +79,13 @@ def _hull(shape: Shape) -> Array:
 
 
 def _pixels(places: Array) -> slice:
-    """Pixels that an interval touches, of those from 0 on."""
+    """Pixels, from 0 on, that the interval of some coordinates (n,) touches."""
     first, last = np.floor(places.min()), np.floor(places.max())
     return slice(max(int(first), 0), max(int(last) + 1, 0))
 
 
 def _runs(pixels: NDArray[np.int64]) -> Iterator[range]:
-    """Ranges of pixels that follow each other."""
+    """Split ascending pixels (n,) into ranges without gaps."""
     if len(pixels):
         for part in np.split(pixels, np.flatnonzero(np.diff(pixels) > 1) + 1):
             yield range(int(part[0]), int(part[-1]) + 1)

@@ -1,12 +1,12 @@
-"""Variances of pixels, pooled with those of neighbours that are as noisy.
+"""Variances of pixels, averaged over neighbours with similar noise.
 
-A few differences of blocks tell little about the variance of one pixel, so it is averaged over
-those around it. But the edge of a light may have 10⁶ times the variance of what lies beside it, and
-a pixel whose samples are all equal has none. So each pair of pixels in a window exchanges a share
-of the difference of their variances: all of it where they are alike, next to nothing where one has
-many times that of the other (as in Perona & Malik 1990, "Scale-Space and Edge Detection Using
-Anisotropic Diffusion"). What one pixel gains another loses, so the mean over a region stays
-unbiased, but for what crosses its border.
+The few differences of blocks of one pixel are a poor estimate of its variance, so variances are
+averaged over neighbouring pixels. The edge of a light may have 10⁶ times the variance of its
+surroundings, and a pixel whose samples are all equal has none. So each pair of pixels in a window
+exchanges a share of the difference of their variances: much if they are similar, almost nothing if
+one is many times the other (as in Perona & Malik 1990, "Scale-Space and Edge Detection Using
+Anisotropic Diffusion"). The sum of the variances is preserved, so the mean over a region stays
+unbiased, apart from exchange across its border.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
     Planes = NDArray[np.float32]
 
 LIKE = (6.0, 4.0, 4.0)
-"""Ratios of variances up to which pixels are alike, in each pass; beyond, the share falls with the
-square of the ratio. Variances vary less after the first pass."""
+"""Ratio of variances up to which pixels are similar, for each pass. Beyond it, the share falls with
+the square of the ratio. Variances scatter less after the first pass."""
 RADIUS = 2
-"""Pixels from the middle of a window to its sides."""
+"""Radius of the window in pixels."""
 ROUNDING = 1e-6
-"""Standard errors that are no larger, relative to the value, may be those of roundings."""
+"""Relative standard errors up to this may be due to rounding, so the pixels are not pooled."""
 STRIP = 2**16
-"""Pixels that are pooled at a time, so that they stay in the cache."""
+"""Number of pixels that are pooled at once, so that they fit the cache."""
 
 
 def pooled(variances: Array, image: Array) -> Array:
-    """Pool variances of the values of an image, (height, width, 3) both.
+    """Return pooled variances of an image, both (height, width, 3).
 
-    What is not finite stays where it is.
+    Pixels with a variance that is not finite are left unchanged.
     """
-    with np.errstate(over="ignore"):  # such values are infinite, and stay so
+    with np.errstate(over="ignore"):  # overflow gives infinity, which is left unchanged
         planes = np.ascontiguousarray(np.moveaxis(variances, 2, 0), np.float32)
         least = np.square(np.moveaxis(image, 2, 0) * ROUNDING).astype(np.float32)
     _, height, width = planes.shape
@@ -54,7 +54,7 @@ def pooled(variances: Array, image: Array) -> Array:
 
 
 def _pooled(planes: Planes, least: Planes) -> Planes:
-    with np.errstate(invalid="ignore", over="ignore"):  # of what is not finite
+    with np.errstate(invalid="ignore", over="ignore"):  # variances that are not finite
         noisy = np.isfinite(planes.sum(axis=0)) & (planes > least)
     for like in LIKE:
         noise = np.sum(planes, axis=0, where=noisy)
@@ -70,7 +70,7 @@ def _pooled(planes: Planes, least: Planes) -> Planes:
 
 
 def _share(a: Planes, b: Planes, like: float) -> Planes:
-    """Share of the difference that pixels of such variances exchange."""
+    """Share of the difference that pixels with variances a and b exchange."""
     larger = np.maximum(a, b)
     ratio = np.minimum(a, b) * np.float32(like)
     np.divide(ratio, larger, out=ratio, where=larger > 0)
@@ -79,7 +79,7 @@ def _share(a: Planes, b: Planes, like: float) -> Planes:
 
 
 def _pairs(height: int, width: int) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
-    """Every pixel and another in its window, as two parts of the picture; each pair once."""
+    """All pairs of pixels in a window, each offset as two slices of the picture; each pair once."""
     for down in range(min(RADIUS + 1, height)):
         for right in range(-RADIUS if down else 1, RADIUS + 1):
             aside = abs(right)

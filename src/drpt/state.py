@@ -1,4 +1,4 @@
-"""What a checkpoint keeps of a render, and whether a render can have been in such a state."""
+"""The state of a render that a checkpoint stores, and its validation."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from drpt.settings import Settings
 
 LONGEST = 1e12
-"""Seconds that a render takes at most: 30 000 years."""
+"""Largest duration of a render, in seconds: 30 000 years."""
 MOST_RAYS = 2**80
-"""Rays at most: those of 2^48 samples in each of 2^32 pixels."""
+"""Largest number of rays: those of 2^48 samples in each of 2^32 pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class State:
     Attributes
     ----------
     spp, block
-        Samples that each pixel has got, and how many of them make up a block.
+        Samples of each pixel, and samples of a block.
     total, blocks
-        Their sums, float64 (pixels, 3), and those of blocks, float32 (used, pixels, 3).
+        Sums of all samples, float64 (pixels, 3), and of blocks, float32 (used, pixels, 3).
     rays, non_finite, first_non_finite, seconds
         As in :class:`drpt.result.Result`.
     last_look
@@ -53,10 +53,10 @@ class State:
     def checked(
         cls, facts: Mapping[str, Any], arrays: Mapping[str, Any], settings: Settings, *, error: bool
     ) -> State:
-        """Return the state that facts and arrays tell of.
+        """Return the state that facts and arrays describe.
 
-        Raises `ValueError`, which says what is wrong, where a render with these settings, which
-        keeps blocks if ``error`` is true, cannot have been in it.
+        Raises `ValueError`, which names the field, the value and what is allowed, if no render with
+        these settings can be in that state. A render has blocks if ``error`` is true.
         """
         spp = check_whole("spp", _get(facts, "spp"), 1, settings.spp)
         block = check_whole("block", _get(facts, "block"), 1, MAX_SPP)
@@ -81,7 +81,7 @@ class State:
 
     @property
     def facts(self) -> dict[str, int | float | list[int] | list[float] | None]:
-        """All but the arrays, as :meth:`checked` takes them."""
+        """All attributes but the arrays, as :meth:`checked` takes them."""
         first, look = self.first_non_finite, self.last_look
         return {
             "spp": self.spp,
@@ -95,7 +95,7 @@ class State:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Likewise."""
+        """The arrays, as :meth:`checked` takes them."""
         return {"total": self.total, "blocks": self.blocks}
 
 
@@ -116,7 +116,10 @@ def _array(
 
 
 def _check_sums(total: NDArray[np.float64], blocks: NDArray[np.float32], non_finite: int) -> None:
-    """Raise `ValueError` unless sums are >= 0, and finite but for as many pixels as samples."""
+    """Raise `ValueError` unless sums are >= 0 and finite.
+
+    Each sample that was not finite explains one pixel at most.
+    """
     bad = ~np.isfinite(total).all(axis=1)
     count = int(bad.sum())
     if count > non_finite or (non_finite and not count):
@@ -131,7 +134,7 @@ def _check_sums(total: NDArray[np.float64], blocks: NDArray[np.float32], non_fin
 def _checked_place(
     value: Any, settings: Settings, spp: int, non_finite: int
 ) -> tuple[int, int, int] | None:
-    """Return column, row and number of the first sample that was not finite, if any was."""
+    """Return column, row and number of the first sample that was not finite, or None."""
     if value is None and not non_finite:
         return None
     camera = settings.scene.camera
@@ -147,7 +150,7 @@ def _checked_place(
 
 
 def _checked_look(value: Any, spp: int) -> tuple[int, float] | None:
-    """Return after how many samples the error was asked for last, and what it was."""
+    """Return the samples of the last error estimate, and its value, or None."""
     if value is None:
         return None
     if not isinstance(value, list) or len(value) != 2:

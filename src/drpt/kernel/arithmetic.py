@@ -25,12 +25,12 @@ class _Environment(ctypes.Structure):
 
 @contextmanager
 def same_bits() -> Iterator[None]:
-    """Trace and run kernels so that their bits depend on no thread and no CPU.
+    """Trace and run kernels so that their bits depend neither on the thread nor on the CPU.
 
-    FastMath lets Dr.Jit take the CPU's approximate reciprocal square root, which has other bits in
-    vectors of 16 numbers than in those of 8. Denormal numbers count as 0 on Dr.Jit's threads; here
-    they do on the calling thread, too, which runs a kernel where the pool has no other thread, or
-    the kernel is small. Both settings belong to a thread.
+    FastMath lets Dr.Jit use the CPU's approximate reciprocal square root, whose bits differ between
+    vectors of 16 and of 8 numbers, so it is turned off. Dr.Jit's threads treat denormal numbers as
+    0. The calling thread runs a kernel if the pool has no other thread or the kernel is small, so
+    it treats them as 0 here, too. Both settings belong to a thread.
     """
     with dr.scoped_set_flag(dr.JitFlag.FastMath, False), _flush_denormals():
         yield
@@ -38,7 +38,7 @@ def same_bits() -> Iterator[None]:
 
 @contextmanager
 def _flush_denormals() -> Iterator[None]:
-    """Make denormals 0 on this thread; does nothing but on Linux on x86-64."""
+    """Treat denormals as 0 on this thread; has an effect only on Linux on x86-64."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         yield
         return

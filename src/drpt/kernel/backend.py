@@ -1,4 +1,4 @@
-"""Chooses Dr.Jit's backend, its LLVM library and its folder for kernels, before it is imported.
+"""Chooses Dr.Jit's backend, its LLVM library and its kernel folder before Dr.Jit is imported.
 
 Importing this module does not import Dr.Jit. Whatever imports Dr.Jit or Mitsuba calls :func:`load`
 first; both then use the same LLVM.
@@ -33,9 +33,9 @@ VARIABLE = "DRPT_BACKEND"
 CACHE_VARIABLE = "DRJIT_CACHE_DIR"
 """The environment variable that names the folder for compiled kernels."""
 CACHE_SIZE_VARIABLE = "DRJIT_CACHE_MAXSIZE"
-"""The environment variable that bounds it; Dr.Jit looks once an hour, when it is imported."""
+"""The environment variable with its largest size, which Dr.Jit enforces once an hour on import."""
 CACHE_SIZE = 2**30
-"""Bytes of compiled kernels that stay; the least recently used ones go."""
+"""Largest size of the kernel folder in bytes; the least recently used kernels are removed."""
 
 NAMES = ("llvm", "cuda")
 
@@ -143,11 +143,11 @@ def _name_library(*, optional: bool) -> None:
 
 
 def _name_cache_folder() -> None:
-    """Give the kernels a folder of their own and a bound, unless somebody has named one."""
+    """Give the kernels a folder of their own and a size limit, unless the user has named one."""
     from platformdirs import user_cache_path
 
     folder = user_cache_path("drpt", appauthor=False) / "kernels"
-    if folder.is_absolute() and not os.environ.get(CACHE_VARIABLE):  # "~" where nobody is at home
+    if folder.is_absolute() and not os.environ.get(CACHE_VARIABLE):  # "~" without a home folder
         os.environ[CACHE_VARIABLE] = str(folder)
         os.environ.setdefault(CACHE_SIZE_VARIABLE, str(CACHE_SIZE))
 
@@ -206,7 +206,7 @@ def _cache_folder() -> Path | None:
 
 
 def _drjit_core() -> ctypes.CDLL:
-    """Return Dr.Jit's library, some of whose functions Python cannot call otherwise."""
+    """Return Dr.Jit's library, for functions that Dr.Jit's Python package lacks."""
     import drjit as dr
 
     return ctypes.CDLL(str(next(Path(dr.__file__).parent.glob("libdrjit-core.*"))))

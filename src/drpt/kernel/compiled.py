@@ -1,19 +1,19 @@
-"""Bounds how many compiled kernels stay in memory, which Dr.Jit does not do by itself."""
+"""Limits the number of compiled kernels in memory; Dr.Jit has no limit."""
 
 from __future__ import annotations
 
 import drjit as dr
 
 MAX_KERNELS = 256
-"""Compiled kernels that stay in memory at most."""
+"""Largest number of compiled kernels in memory."""
 KERNELS_PER_USER = 16
-"""More than one launcher compiles: one to render, and some to learn a guide or to record paths."""
+"""More kernels than one launcher needs to render, to train a guide and to record paths."""
 
 
 class CompiledKernels:
-    """Counts who uses kernels since all of them were dropped, and drops them once there are many.
+    """Counts the users of kernels, and drops all kernels from memory once there are many users.
 
-    What is still in use is then loaded from Dr.Jit's folder of compiled kernels, in milliseconds.
+    Dr.Jit then loads kernels that are still used from its folder again, in milliseconds.
     """
 
     def __init__(self) -> None:

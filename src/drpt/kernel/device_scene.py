@@ -32,16 +32,16 @@ if TYPE_CHECKING:
     from drpt.kernel.solids import Solid
 
 AFAR = 2.0**16
-"""A sphere is seen from afar from so many of its radii on.
+"""Distance, in radii, from which a sphere counts as far away.
 
-There distances are rounded by 2⁻²⁴ of themselves, which is 1/256 of its radius.
+There a distance is rounded by 1/256 of the radius.
 """
 LARGE = 1 / 16
 """A sphere is large if the origin is no farther from its surface, relative to its radius."""
 NEAR = 16
-"""It is so for rays alone that start no farther away, relative to its radius.
+"""Largest distance of a ray's origin, in radii, for which a sphere is treated as large.
 
-The power of their origin is rounded by 2⁻²⁴ of the square of its distance.
+The power of the origin is rounded by 2⁻²⁴ of its squared distance.
 """
 
 
@@ -98,7 +98,7 @@ class DeviceScene:
     light_corners
         Rows of 9 by emitting triangle.
     afar
-        Whether rays may come to spheres from afar, see `AFAR`.
+        Whether rays may start far away from spheres, see `AFAR`.
     """
 
     types: ModuleType
@@ -125,7 +125,7 @@ class DeviceScene:
     afar: bool = False
 
     def seen_from(self, eye: NDArray[np.float64], primitives: Primitives) -> DeviceScene:
-        """The same scene for rays from an eye, too, and from all of its primitives."""
+        """The same scene, prepared for rays that start at its primitives or at an eye (3,)."""
         if not len(primitives.spheres):
             return self
         extent, radii = primitives.extent(eye), primitives.spheres[:, 3]
@@ -234,9 +234,9 @@ def _loose(primitives: Primitives, solids: tuple[Solid, ...]) -> Iterator[tuple[
 
 
 def _reach(primitives: Primitives, loose: list[int]) -> NDArray[np.float64]:
-    """How far triangles reach whose seams are wider than the rounding of a point on them.
+    """Largest coordinates of triangles whose seams are wider than the rounding of a point on them.
 
-    Pieces of a triangle have seams with others without sharing whole edges with them.
+    If triangles are cut, their pieces have seams without sharing whole edges.
     """
     reach = np.zeros(len(primitives.facets))
     for numbers in edge_owners([primitives.facets[i].corners for i in loose]).values():

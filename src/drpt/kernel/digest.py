@@ -1,7 +1,7 @@
-"""A digest of what kernels get: two machines that agree on it trace the same samples.
+"""A digest of the input of kernels: two machines with the same digest trace the same samples.
 
-A scene is prepared on the host in float64, where libraries may round the last bit as the CPU has
-it. Kernels get 32 bits of that, so numbers count as they are in float32.
+The host prepares a scene in float64, where the last bit may depend on the CPU. Kernels get float32,
+so numbers are digested as float32.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def digest(*things: Any) -> str:
     """SHA-256, in hexadecimal, of all numbers and names in objects of the kernel package.
 
-    Of a `TriangleMesh` there are none: the corners that it was made from stand in `Primitives`.
+    A `TriangleMesh` is skipped: `Primitives` holds the corners from which it was made.
     """
     sha = hashlib.sha256()
     for thing in things:
@@ -32,7 +32,7 @@ def digest(*things: Any) -> str:
 
 
 def _parts(thing: Any) -> Iterator[bytes]:
-    """Bytes that tell a thing from others, each part with its kind and size."""
+    """Bytes that identify an object, each part with its type and size."""
     if isinstance(thing, TriangleMesh):
         return
     if isinstance(thing, np.ndarray) or dr.is_array_v(thing):
@@ -57,7 +57,7 @@ def _numbers(array: np.ndarray[Any, Any]) -> Iterator[bytes]:
 
 
 def _members(thing: Any) -> list[Any]:
-    """What a container has; of a dataclass its fields alone, as it may keep other results."""
+    """Items of a container, or fields of a dataclass, which may cache other attributes."""
     if isinstance(thing, list | tuple):
         return list(thing)
     if is_dataclass(thing):

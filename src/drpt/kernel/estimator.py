@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 REGENERATION_BOUNCES = 3
 """From so many bounces on, lanes would wait for their neighbours long enough."""
 SMALL_LAMP = 1 / 16
-"""Area of a sphere that emits relative to that of all facets: in a convex room, so many of the
-paths run into it. More of them had better count its light."""
+"""Largest area of a small sphere light, relative to the area of all facets. In a convex room this
+is the share of paths that hit it. If more paths hit a lamp, hits should count its light."""
 SHARING_SPP = 64
 """With so many samples per pixel, edges are smooth even if a few share a camera ray."""
 
@@ -115,7 +115,7 @@ class Features:
     ) -> Features:
         """Features of a kernel for these primitives, this many bounces and this mode.
 
-        ``worthwhile`` tells whether a guide is expected to bring less noise.
+        ``worthwhile`` says whether a guide is expected to reduce the noise.
         """
         facts = feature_facts(primitives, bounces, mode, worthwhile=worthwhile)
         return cls(**{field.name: facts[field.name].holds for field in fields(cls)})
@@ -333,14 +333,14 @@ def _hits_count(primitives: Primitives, mode: Mode, guiding: Fact) -> Need:
 
 
 def knows_all(primitives: Primitives) -> bool:
-    """Whether a guide knows all that reflects direct light, and little of it has noise."""
+    """Whether a guide covers all surfaces that reflect direct light, which has little noise."""
     facets = primitives.diffuse[: len(primitives.facets)]
     only_facets = len(facets) == len(primitives.diffuse)
     return has_small_lamp(primitives) and only_facets and bool(facets.all())
 
 
 def has_small_lamp(primitives: Primitives) -> bool:
-    """Whether one sphere alone emits, and few paths from facets run into it."""
+    """Whether one small sphere is the only light, so that few paths from facets hit it."""
     if not len(primitives.radiance) == primitives.sphere_lights == 1:
         return False
     facets = sum(float(np.linalg.norm(area_normal(f.corners))) for f in primitives.facets)

@@ -1,7 +1,7 @@
 """First hits: what the camera sees at once, as layers that denoisers and viewers take.
 
-The launches that trace paths trace camera rays alone here, which bring home a feature of what they
-meet in place of its light.
+The launches that trace paths trace only camera rays here, and accumulate a feature of the first hit
+instead of radiance.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def first_hits(
     seed: int = 0,
     jitter: bool = True,
 ) -> dict[str, NDArray[np.float32]]:
-    """Average what camera rays meet first, on the backend ``types``.
+    """Average features of the first hits of camera rays, on the backend ``types``.
 
     Sample number k of a pixel goes through the same point as camera ray number k of a render with
     the same sampler, seed and jitter; the pixel filter is the same box.
@@ -96,10 +96,16 @@ def first_hits(
 
 
 class Seen(NamedTuple):
-    """What the camera sees at the centres of all pixels, row by row.
+    """First hits of the rays through the centres of all n pixels, row by row.
 
-    ``shape`` (n,) are numbers of shapes, `NONE` for the background; ``front`` (n,) tells whether
-    their front is seen, ``point`` (n, 3) where, in world space.
+    Attributes
+    ----------
+    shape
+        Numbers of shapes (n,), `NONE` for the background.
+    front
+        Whether the ray hits the front (n,).
+    point
+        The points that are hit, in world space (n, 3).
     """
 
     shape: NDArray[np.intp]
@@ -108,7 +114,7 @@ class Seen(NamedTuple):
 
 
 def first_seen(types: ModuleType, scene: Scene) -> Seen:
-    """Find what the camera sees first, on the backend ``types``."""
+    """Trace a ray through the centre of each pixel, on the backend ``types``."""
     with interrupts_put_off():
         primitives, on_device = prepare(scene.shapes, types)
         features = replace(_features(primitives), covered_pixels=False)
@@ -122,14 +128,14 @@ def first_seen(types: ModuleType, scene: Scene) -> Seen:
     y, x, _ = np.indices((*place.shape[:2], 1)).reshape(3, -1, 1) + 0.5
     ways = plane.corner + x * plane.right + y * plane.down
     ways *= (distance / np.linalg.norm(ways, axis=1))[:, None]
-    shapes = np.append(primitives.shape, NONE)  # number -1 is the last
+    shapes = np.append(primitives.shape, NONE)  # index -1 is the background
     return Seen(shapes[primitive.astype(np.intp) - 1], front > 0, scene.camera.eye + ways)
 
 
 def _features(primitives: Primitives) -> Features:
-    """What first hits need: all surfaces, whether there is light on them or not.
+    """Features of a kernel for first hits: all surfaces, lit or not.
 
-    Where there is no surface, as of shapes without area, nothing is traced.
+    Without any surface, as for shapes without area, nothing is traced.
     """
     return replace(
         Features.of(primitives, 0, Mode.IMPLICIT),
@@ -148,7 +154,7 @@ def _axis(camera: Camera, types: ModuleType) -> Array3f:
 
 
 def _mean(launcher: Launcher, camera: Camera, spp: int, seed: int) -> NDArray[np.float64]:
-    """Means (height, width, 3) of what the samples of each pixel bring home."""
+    """Means (height, width, 3) of the feature over the samples of each pixel."""
     sums = np.zeros((camera.height * camera.width, 3))
     parts = _split(len(sums), LAUNCH_PIXELS), _split(spp, LAUNCH_SAMPLES)
     for pixels, samples in product(*parts):
@@ -163,7 +169,7 @@ def _split(count: int, size: int) -> list[range]:
 
 
 class _FirstHitTracer(Tracer, ABC):
-    """A tracer of camera rays alone, with a feature of what they meet for the radiance."""
+    """A tracer of camera rays only, with a feature of the first hit in place of radiance."""
 
     def first_vertex(self, ray: Ray, sampler: Sampler, known: Known | None = None) -> Vertex:
         path = self.start(ray)
@@ -191,7 +197,7 @@ class _NormalTracer(_FirstHitTracer):
 
 
 class _PlaceTracer(_FirstHitTracer):
-    """The number of the primitive, from 1 on, the distance, and whether its front is seen."""
+    """The number of the primitive plus 1, the distance, and 1 if the front is hit, else 0."""
 
     def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
         kind = type(hit.distance)

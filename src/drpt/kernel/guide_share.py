@@ -1,4 +1,4 @@
-"""Which share c of the directions a guide chooses: by depth and albedo.
+"""The share c of directions that a guide chooses, by depth and albedo.
 
 A guide knows where direct light is reflected. Let a vertex of a path have n vertices after it that
 can get direct light. If the surfaces have the albedo ρ, the light that arrives is
@@ -46,15 +46,15 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 GREATEST = 0.5
-"""Share at the most."""
+"""Largest share."""
 KNOWN = 0.8
-"""Part of the reflected direct light that a guide leads to: some directions are blocked."""
+"""Fraction of the reflected direct light that a guide reaches; some directions are blocked."""
 LEAST = 1 / 32
 """Smaller shares gain nothing, and leave too few bits of a random number for a direction."""
 STEP = 2.0**-10
 """Shares are multiples of this: then 1 − c is exact, and no random number is rounded to 1."""  # noqa: RUF001
 MOST_VERTICES = 256
-"""With more vertices to come than this, a share of at least `LEAST` does not change any more."""
+"""Number of later vertices beyond which a share of at least `LEAST` no longer changes."""
 
 
 @dataclass
@@ -65,7 +65,7 @@ class GuideShares:
     width: int
 
     def of(self, patch: UInt32, vertices: int | UInt32) -> Float:
-        """The guide's share on a patch, with so many vertices to come; 0 on patch 0."""
+        """The guide's share on a patch, given the number of later vertices; 0 on patch 0."""
         types = types_of(self.table)
         count = types.UInt32(max(0, vertices) if isinstance(vertices, int) else vertices)
         column = dr.minimum(count, self.width - 1)

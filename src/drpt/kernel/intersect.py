@@ -59,7 +59,7 @@ class Known(NamedTuple):
 
 
 class ManySpheres(Protocol):
-    """Spheres in a hierarchy; rays may come from ``afar``, see `Ball`."""
+    """Spheres in a hierarchy; for ``afar`` see `Ball`."""
 
     afar: bool
 
@@ -362,10 +362,11 @@ def _on_sphere(row: Array4f, p: Array3f, ray: Ray) -> _Place:
 
 
 def _on_sphere_afar(row: Array4f, ray: Ray) -> _Place:
-    """As on a sphere, but from the line of the ray, and from where it starts.
+    """As on a sphere, but computed from the ray's origin and direction alone.
 
-    A point of the ray may be rounded by more than the radius. How far aside of the centre the ray
-    passes is known, and it meets the half of the sphere before it, or from inside the other one.
+    A point of the ray may be rounded by more than the radius. The distance at which the ray passes
+    the centre is exact enough. From outside, the ray hits the near half of the sphere; from inside,
+    the far half.
     """
     center, radius = vec3(row[0], row[1], row[2]), row[3]
     from_center = ray.origin - center

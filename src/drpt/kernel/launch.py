@@ -85,7 +85,7 @@ class Launcher:
     primitives: Primitives
 
     def __post_init__(self) -> None:
-        self._token = object()  # no field: it says nothing of the samples, which a digest tells
+        self._token = object()  # not a field, so that digests leave it out
 
     def launch(self, pixels: range, samples: range, run: int, seed: int) -> Sums:
         """Trace a range of samples of each pixel in a range, in runs of so many after each other.
@@ -219,7 +219,7 @@ def learned(shapes: tuple[Shape, ...], types: ModuleType) -> Guide:
 
 
 def guide_shares(scene: Scene, bounces: int, mode: Mode, types: ModuleType) -> GuideShares | None:
-    """Shares of the directions that are guided; None where a guide is not worthwhile."""
+    """Shares of the directions that are guided; None if a guide is not worthwhile."""
     primitives, device_scene = prepare(scene.shapes, types)
     if not Features.of(primitives, bounces, mode).guiding:
         return None
@@ -235,7 +235,7 @@ def guide_shares(scene: Scene, bounces: int, mode: Mode, types: ModuleType) -> G
 
 @Kept
 def piloted(camera: Camera, shapes: tuple[Shape, ...], types: ModuleType, bounces: int) -> Pilot:
-    """Paths that tell what a guide brings: kept like it, for the same camera."""
+    """Paths that estimate the benefit of a guide; kept for the next render by the same camera."""
     return fly(*prepare(shapes, types), camera, learned(shapes, types), bounces)
 
 

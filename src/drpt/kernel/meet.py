@@ -31,7 +31,7 @@ class Ball:
     One that is large against its distance from the origin, such as the ground, also has the
     ``power`` of the origin, |c|² − r²: there the difference would lose all of its digits.
 
-    Rays may come from ``afar``, where distances are rounded by more than its radius.
+    With ``afar``, rays may start so far away that distances are rounded by more than its radius.
     """
 
     center: Array3f
@@ -162,9 +162,9 @@ def meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
     """First meeting with a sphere beyond the origin, the ray's direction being a unit vector.
 
     Source: Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection" (Ray Tracing
-    Gems, ch. 7). Rays that start near a large sphere are told by the power of their origin instead.
-    From ``afar``, b is rounded, and the direction's length is not quite 1: what that leaves of the
-    way along the ray is taken off the point next to the centre.
+    Gems, ch. 7). Rays that start near a large sphere use the power of their origin instead.
+    From ``afar``, b is rounded, and the direction's length is not exactly 1, so the closest point
+    keeps a component along the ray. It is removed.
     """
     f = ray.origin - ball.center
     b = -dr.dot(f, ray.direction)
@@ -185,7 +185,7 @@ def meet_sphere(ray: Ray, ball: Ball) -> tuple[Bool, Float]:
 
 
 def across(v: Array3f, direction: Array3f) -> Array3f:
-    """What is left of a vector without its part along a direction."""
+    """The component of a vector perpendicular to a unit direction."""
     return dr.fma(direction, -dr.dot(v, direction), v)
 
 

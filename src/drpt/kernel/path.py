@@ -179,7 +179,7 @@ class Tracer:
             radiance = radiance + path.beta * emitted
         hit = hit._replace(valid=hit.valid & (hit.primitive < self.scene.first_light) & reflects)
         brdf = make_brdf(features, hit, -path.direction)
-        # After the last bounce there is but light, which a guide knows nothing of.
+        # The last segment can only hit a light; do not guide it.
         guided = brdf.is_diffuse & (depth + 1 < self.bounces)
         patch = dr.select(guided, patch, type(patch)(0))
         share = self._share(patch, self.bounces - 1 - depth)
@@ -207,7 +207,7 @@ class Tracer:
     def _weigh(
         self, path: Path, hit: Hit, patch: UInt32, depth: Any, guide: Guide
     ) -> tuple[Path, Hit]:
-        """Weigh both ways to choose a direction; what has missed its aim is lost."""
+        """Weight both ways to choose a direction; reject guided rays that miss their target."""
         lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
         density = self._share(path.patch, self.bounces - depth) * guide.density(path.patch, patch)
         by_guide = density * dr.square(hit.distance)
@@ -261,7 +261,7 @@ class Tracer:
         return Turn(direction, brdf.weight(direction) / unguided, pdf, aim)
 
     def _share(self, patch: UInt32, vertices: Any) -> Any:
-        """The share of the directions from a patch that a guide chooses, with so many to come."""
+        """The guide's share of the directions from a patch, given the number of later vertices."""
         return self.shares.of(patch, vertices) if self.shares else 0
 
     def _emission(self, path: Path, hit: Hit, counts: Bool | bool, *, weighted: bool) -> Array3f:

@@ -1,4 +1,4 @@
-"""What a guide is expected to bring to a picture: from a few paths that follow the BRDF alone.
+"""The noise that a guide is expected to save, estimated from a few paths that follow the BRDF.
 
 A path of density p whose contribution X_d is collected at vertex d would be found by guided
 directions, too. The density of its directions is p ∏ m_d there, with
@@ -46,17 +46,18 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 PIXELS, SAMPLES = 512, 32
-"""About so many pixels of the camera's picture, and samples of each."""
+"""Approximate number of pixels of the picture, and number of samples of each."""
 BOUNCES = 3
-"""At the most: the second guided vertex already tells what a share does to rare bright paths."""
+"""Largest number of bounces: the effect of a share on rare bright paths shows at the second guided
+vertex."""
 SEED = 0x9E3779B9
-"""Of the paths; a render's seed changes nothing."""
+"""Seed of the paths, whatever the seed of the render."""
 DARK = 0.01
-"""Added to squares of radiance, so that dark pixels do not decide."""
+"""Added to squared radiance, so that dark pixels do not dominate."""
 SCALES = (1.0, 0.75, 0.5, 0.25)
-"""What shares are multiplied by, to find the best."""
+"""Factors of the shares among which the best is chosen."""
 WORTHWHILE = 0.9
-"""Of the relMSE without a guide: it has to be expected to fall to this."""
+"""A guide is used if the expected relMSE is below this fraction of that without a guide."""
 
 
 class Pilot(NamedTuple):
@@ -92,7 +93,7 @@ def fly(
     light, ratio, row = (np.array([x.numpy() for x in part]) for part in found)
     shape = -1, width * height, SAMPLES
     light, ratio = (part.astype(np.float64).reshape(shape) for part in (light, ratio))
-    with np.errstate(invalid="ignore"):  # infinite light: nothing is expected of a guide then
+    with np.errstate(invalid="ignore"):  # infinite light: no guide is used
         return Pilot(np.diff(light, axis=0, prepend=0), ratio, row.reshape(shape))
 
 
@@ -141,7 +142,7 @@ def best_shares(pilot: Pilot, shares: Array, bounces: int) -> Array | None:
 
 
 def expected(pilot: Pilot, shares: Array, bounces: int) -> float:
-    """Expected relMSE with a guide over that without; infinite where that cannot be told (host)."""
+    """Expected relMSE with a guide over that without; infinite if it is unknown (host)."""
     light, ratio, row = pilot
     guided, weight, density = np.zeros_like(light[0]), 1.0, 1.0
     with np.errstate(all="ignore"):

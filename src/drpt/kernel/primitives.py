@@ -76,9 +76,9 @@ class Primitives:
     shape
         Number of each primitive's shape in the scene; of coincident lights, the first's.
     overlaps
-        The shapes that overlap, of which the earlier ones are cut.
+        Pairs of shapes that overlap, the earlier of which is cut.
     is_cut
-        Whether some triangles are pieces of those of a mesh.
+        Whether some triangles are pieces of a triangle that was cut.
     """
 
     origin: Array
@@ -157,13 +157,13 @@ class Primitives:
         return any(solid.encloses for solid in self.solids) or self._in_a_sphere()
 
     def extent(self, eye: Array) -> float:
-        """Diagonal of the box around the scene and an eye: no ray starts farther from a sphere."""
+        """Diagonal of the box around the scene and an eye (3,): a bound of all distances."""
         low, high = self._corners
         return float(np.linalg.norm(np.maximum(high, eye) - np.minimum(low, eye)))
 
     @cached_property
     def _corners(self) -> tuple[Array, Array]:
-        """Of the box around the scene."""
+        """Lowest and highest corner (3,) of the box around the scene."""
         points, radii = self._balls()
         return (points - radii[:, None]).min(axis=0), (points + radii[:, None]).max(axis=0)
 
