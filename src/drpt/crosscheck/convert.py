@@ -34,9 +34,9 @@ def to_mitsuba(scene: Scene, bounces: int = 3) -> Any:
     - Mitsuba 3.9.1 loses digits in the solid angle of small and far sphere lights: at a radius /
       distance of 0.03 it is off by 1e-4 at the most, at 0.001 by up to 10 %; below 1.7e-4 the light
       is black. `drpt.crosscheck.domain` has a bound.
-    - Of shapes that overlap in one plane Mitsuba gets what is seen: the earlier ones are cut as for
-      drpt's kernels. Where a light is in the plane of an earlier surface that reflects, nothing is
-      cut, and Mitsuba shows one of them, depending on rounding.
+    - Shapes that overlap in one plane are cut for Mitsuba as for drpt's kernels. Where a light lies
+      in the plane of an earlier surface that reflects, nothing is cut, and rounding decides which
+      of them Mitsuba shows.
 
     Raises
     ------
@@ -53,7 +53,8 @@ def to_mitsuba_dict(scene: Scene, bounces: int = 3) -> dict[str, Any]:
     """Return the dict that Mitsuba loads the scene from; meshes are in it as Mitsuba's objects.
 
     See :func:`to_mitsuba`. Phong surfaces are of the type ``drpt_phong``, which is registered in
-    the variant that is set. Shapes are whole, also where they overlap in one plane.
+    the variant that is set. Shapes are not cut: where they overlap in one plane, rounding decides
+    which of them Mitsuba shows.
     """
     mi = load_mitsuba()
     shapes = {f"shape{i}": _shape(mi, shape) for i, shape in enumerate(scene.shapes)}
@@ -70,7 +71,7 @@ def _settings(mi: Any, scene: Scene, bounces: int) -> dict[str, Any]:
 
 
 def _seen_shapes(mi: Any, scene: Scene) -> dict[str, Any]:
-    """Return Mitsuba's shapes by name; what drpt cuts away of overlapping shapes is left out."""
+    """Return Mitsuba's shapes by name, cut where they overlap as for drpt's kernels."""
     origin = origin_of(scene.shapes)
     parts = resolve_overlaps(make_parts(scene.shapes, origin)).parts
     shapes = {}

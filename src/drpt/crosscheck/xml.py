@@ -26,7 +26,8 @@ def to_mitsuba_xml(scene: Scene, path: str | PathLike[str], bounces: int = 3) ->
 
     Its meshes go into the folder ``<stem>-meshes`` beside it, as PLY files that are named by their
     content. ``mitsuba -m scalar_rgb -D spp=256 -o picture.exr scene.xml`` then renders what
-    `to_mitsuba` does, with 256 samples per pixel instead of 64; ``-m llvm_ad_rgb`` is faster.
+    `to_mitsuba` does, with 256 samples per pixel instead of 64; ``-m llvm_ad_rgb`` is faster. The
+    file has all shapes whole: where they overlap in one plane, rounding decides which one is seen.
 
     Raises
     ------
