@@ -39,7 +39,10 @@ def core_quota(root: Path = Path("/")) -> float | None:
 
 
 def free_memory(root: Path = Path("/")) -> int:
-    """Bytes of memory that this process can have now: of the machine, its groups and its limit.
+    """Bytes of memory that this process can allocate now.
+
+    This is the least of the machine's free memory, the rest of the process's control groups, and
+    the rest of its limit of address space.
 
     Source: proc_meminfo(5), and Linux's documentation of control groups, as for `core_quota`.
     """
@@ -58,7 +61,7 @@ def free_memory(root: Path = Path("/")) -> int:
 
 
 def require_memory(needed: int, what: str) -> None:
-    """Raise `ValueError`, with the size that is needed, unless there is as much free memory."""
+    """Raise `ValueError` with both sizes if more memory is needed than is free, in bytes."""
     free = free_memory()
     if needed > free:
         sizes = f"{size_in_words(needed)} of memory, and {size_in_words(free)} are free"
@@ -75,7 +78,7 @@ def _machine_memory(root: Path) -> int:
 
 
 def _group_memory(folder: Path) -> int:
-    """Bytes that a control group has left, with the files' pages that it can give up."""
+    """Bytes that a control group has left, including pages of files that it can reclaim."""
     if (folder / "memory.max").exists():
         limit, used, cache = "memory.max", "memory.current", "inactive_file"
     else:

@@ -4,8 +4,9 @@ With the samples n of a pixel in each of them, its value x and standard error s 
 
     x = Σ nᵢ xᵢ / Σ nᵢ,    s = √(Σ (nᵢ sᵢ)²) / Σ nᵢ,
 
-as other seeds are independent. The relMSE is that of these standard errors, times what the relMSE
-of the pictures is over that of theirs: standard errors are smoothed, and tell it less well.
+as other seeds are independent. The relMSE is computed from these standard errors, which are
+smoothed, and corrected by the ratio of the relMSE that the pictures state to that of their standard
+errors.
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ class _Sums:
     metadata: Metadata
     layers: dict[str, _Weighted]  # all but the next
     squares: Array  # Σ (nᵢ sᵢ)²; not a number unless all standard errors are known
-    told: float  # Σ nᵢ² relMSEᵢ, as the pictures tell it
+    told: float  # Σ nᵢ² relMSEᵢ, as the pictures state it
     derived: float  # the same, from their standard errors
 
     @property
@@ -161,7 +162,7 @@ def _read(path: Path) -> _Sums:
 
 
 def _check_layers(path: Path, samples: Array, errors: Array, image: Array) -> None:
-    """Refuse layers with the names of drpt's that are something else."""
+    """Raise `ValueError` if a layer with one of drpt's names has other content."""
     if samples.shape != image.shape[:2] or not ((samples >= 0) & (samples <= MOST)).all():
         raise ValueError(f"{path}: its layer {SAMPLES} is not one number >= 0 for each pixel")
     if errors.shape != image.shape or (errors < 0).any():

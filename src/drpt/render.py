@@ -53,13 +53,13 @@ __all__ = [
 ]
 
 PACKAGES = ("drjit", "mitsuba", "numpy")
-"""Those that a picture's bits come from, beside drpt itself."""
+"""Packages, beside drpt, whose versions determine the bits of a picture."""
 OTHER_SEED = 2**32
-"""Added to the seed, it gives other noise."""
+"""Offset to the seed of independent samples."""
 PIXEL_BYTES = 72
 """Bytes of a pixel: its sum, the mean of a result, and its image, in float64 and float32."""
 ERROR_BYTES = PIXEL_BYTES + 8 * 12
-"""With the sums of eight blocks."""
+"""Bytes of a pixel with the sums of eight blocks, for the error."""
 FIRST_HIT_SPP = 64
 """Samples after which layers of first hits are as smooth as edges in 8 bits."""
 
@@ -153,14 +153,14 @@ class Rendering:
             start = perf_counter()
 
     def _stopping_error(self) -> float:
-        """The error that stopping goes by; missed light is looked for once all else is enough."""
+        """Error for the stopping rule; missed light is searched once the bound is small enough."""
         result = self.result()
         if not self._stopping.is_enough(result.error_bound):
             return result.error_bound
         return result.error_bound + self._missed_light(result)
 
     def _missed_light(self, result: Result) -> float:
-        """What light that is seen directly, but was missed, adds to the relMSE."""
+        """RelMSE of directly visible light that the samples have missed."""
         settings = self.settings
         with backend.interrupts_put_off():
             lights = self._new_launcher(0)
@@ -369,7 +369,7 @@ class Rendering:
         return checkpoint
 
     def _restore(self, path: Path, facts: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
-        """Become the render that a checkpoint tells of, if there can be such a one."""
+        """Restore the state in a checkpoint; raises `CheckpointError` if it is impossible."""
         try:
             state = State.checked(facts, arrays, self.settings, error=self._has_error)
         except ValueError as error:
@@ -381,7 +381,7 @@ class Rendering:
         self._stopping.last_look = state.last_look
 
     def _identity(self) -> dict[str, str | int | bool | None]:
-        """All that decides about the bits of the picture; the CPU and its threads do not."""
+        """Everything that determines the bits of the picture; CPU and threads do not."""
         machine = backend.describe()
         settings = {**vars(self.settings), "seed": str(self.settings.seed)}
         return {
@@ -396,7 +396,7 @@ class Rendering:
         }
 
     def _digest(self) -> str:
-        """What tells whether another machine has prepared the scene as this one has."""
+        """Digest of the prepared scene, to compare it with that of another machine."""
         from drpt.kernel.digest import digest
 
         with backend.interrupts_put_off():
@@ -469,7 +469,7 @@ def render(  # noqa: PLR0913 -- a setting each
     target_error
         Stop as soon as the estimated relMSE of the picture is no larger, from 64 samples on.
     time_limit
-        Stop as soon as so many seconds are over, compilation included; the running pass ends.
+        Stop after this number of seconds, compilation included; the running pass ends.
     checkpoint
         A file to keep the state in; the same call takes it up again, and gives the same bits as
         one that was never interrupted.
@@ -486,11 +486,11 @@ def render(  # noqa: PLR0913 -- a setting each
     Returns
     -------
     Result
-        The same call gives the same bits, if no time limit stops it, whatever the number of threads
-        and on every x86-64 CPU with FMA; scenes of so many triangles that Embree meets them were
-        measured on one CPU only. Samples that are not finite stay in it, and give a
-        `RuntimeWarning` that says where; a black picture gives one that says why, and shapes that
-        overlap in one plane one that names them.
+        The same call gives the same bits, if no time limit stops it, with any number of threads and
+        on every x86-64 CPU with FMA. Scenes with more triangles than are unrolled, which Embree
+        intersects, were measured on one CPU only. A `RuntimeWarning` says where samples are not
+        finite (they stay in the picture), why a picture is black, and which shapes overlap in one
+        plane.
 
     Raises
     ------

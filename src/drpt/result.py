@@ -33,7 +33,7 @@ _NOT_METADATA = {"image", "scene", "layers", "first_non_finite", "warning"}
 
 @dataclass(frozen=True, eq=False)
 class Result(Immutable):
-    """A picture, and what it took; its arrays cannot be written to.
+    """A picture, its settings and its cost; its arrays cannot be changed.
 
     Attributes
     ----------
@@ -103,17 +103,17 @@ class Result(Immutable):
 
     @cached_property
     def error_bound(self) -> float:
-        """Half of a relMSE that the image hardly exceeds; ``target_error`` stops by it.
+        """Half of a relMSE that the image is unlikely to exceed; ``target_error`` compares it.
 
-        It equals ``error`` where many pixels hold it.
+        It equals ``error`` if the error is spread over many pixels.
         """
         return self._estimate.bound + self._missed
 
     @property
     def error_uncertain(self) -> bool:
-        """Whether the true relMSE may well be more than twice ``error``.
+        """Whether the true relMSE may exceed twice ``error``.
 
-        A few pixels hold most of it, or light that is seen directly has been missed.
+        Either a few pixels have most of the error, or samples have missed directly visible light.
         """
         return bool(self.error_bound > self.error)
 

@@ -33,10 +33,10 @@ class Request:
 
 @contextmanager
 def interrupts_raised() -> Iterator[None]:
-    """Let Ctrl-C raise `KeyboardInterrupt` once; the next one does what it did before.
+    """Let Ctrl-C raise `KeyboardInterrupt` once, and restore the previous handler.
 
-    During an import it ends the process instead: some modules take any exception there for a
-    missing dependency, and go on. A signal that was ignored stays so.
+    During an import it ends the process instead, as some modules take any exception there for a
+    missing dependency and continue. An ignored signal stays ignored.
     """
     before = signal.getsignal(signal.SIGINT)
 
@@ -56,7 +56,7 @@ def interrupts_raised() -> Iterator[None]:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether a frame is part of an import."""
+    """Whether a frame runs during an import."""
     while frame is not None and "importlib._bootstrap" not in frame.f_code.co_filename:
         frame = frame.f_back
     return frame is not None

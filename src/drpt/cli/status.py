@@ -36,7 +36,7 @@ def bad_input(parser: argparse.ArgumentParser) -> Iterator[None]:
 
 @contextmanager
 def one_line_warnings(program: str) -> Iterator[None]:
-    """Print warnings without the place in the code that they come from."""
+    """Print each warning on one line, without its place in the code."""
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: say(f"{program}: warning: {message}")
         yield
@@ -49,7 +49,7 @@ def say(line: str) -> None:
 
 
 def print_anything() -> None:
-    """Let stdout and stderr escape what their encoding lacks, such as letters of a file's name."""
+    """Let stdout and stderr escape characters that their encoding lacks, as in file names."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # not None, nor what a caller has put there
             stream.reconfigure(errors="backslashreplace")

@@ -99,8 +99,8 @@ class Report:
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Write both pictures and maps of their differences into a folder; return their paths.
 
-        See :func:`drpt.crosscheck.maps.save_maps`. Each picture tells its noise, its bounces and
-        its scene, as a reference must.
+        See :func:`drpt.crosscheck.maps.save_maps`. Each picture has its noise, its bounces and its
+        scene, as a reference must.
         """
         scene = to_toml(self.reference.scene)
         common: Metadata = {"bounces": self.reference.bounces, "scene": scene}

@@ -198,7 +198,7 @@ def _root(mi: Any, source: str | PathLike[str] | dict[str, Any]) -> Element:
 
 
 def _message(error: RuntimeError | UnicodeDecodeError) -> str:
-    """Return a message of Mitsuba's, which may quote text that is not UTF-8."""
+    """Return one of Mitsuba's messages, which may quote text that is not UTF-8."""
     if isinstance(error, UnicodeDecodeError):
         return _plain(bytes(error.object).decode(errors="replace"))
     return _plain(str(error))

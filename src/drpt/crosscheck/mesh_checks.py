@@ -1,7 +1,7 @@
-"""Looks at mesh files before Mitsuba's loaders do.
+"""Checks mesh files before Mitsuba's loaders read them.
 
-They trust the counts and indices of a PLY file, cut the polygons of an OBJ file into fans, and
-leave normals as they find them in memory where an OBJ file has none.
+The loaders trust the counts and indices of a PLY file, cut every polygon of an OBJ file into a fan,
+and leave normals uninitialised where an OBJ file has none.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 MAX_HEADER = 2**16
-"""Bytes of the header of a PLY file."""
+"""Largest header of a PLY file, in bytes."""
 ROWS = 2**20
-"""Faces of which the indices are in memory at once."""
+"""Number of faces whose indices are in memory at once."""
 MAX_LINE = 1000
-"""Bytes of a line in an OBJ file; Mitsuba refuses some more than these."""
+"""Longest line of an OBJ file in bytes; Mitsuba refuses slightly longer ones."""
 _SIZES = {"char": "i1", "short": "i2", "int": "i4", "long": "i8", "float": "f4", "double": "f8"}
 PLY_TYPES = {
     **_SIZES,
@@ -53,7 +53,7 @@ _CORNER = re.compile(rb"[0-9]+(/[0-9]*(/[0-9]*)?)?")
 
 
 class _Element(NamedTuple):
-    """A list in a PLY file, as Mitsuba takes it: each property that is a list has three items."""
+    """An element of a PLY file as Mitsuba reads it, where each list property has three items."""
 
     name: str
     length: int
@@ -62,9 +62,9 @@ class _Element(NamedTuple):
 
 @contextmanager
 def checked_mesh(kind: str, path: Path, *, flat: bool) -> Iterator[Path]:
-    """Give the file that Mitsuba can load instead of an OBJ or PLY file, mostly the same.
+    """Yield a file that Mitsuba can load: an OBJ or PLY file, or a corrected copy.
 
-    Raises `SceneError` if there is none; a missing file is left to Mitsuba.
+    Raises `SceneError` for a file that it cannot load. A missing file is left to Mitsuba.
     """
     if not path.exists():
         yield path
@@ -87,7 +87,7 @@ def checked_mesh(kind: str, path: Path, *, flat: bool) -> Iterator[Path]:
 
 
 def _check_ply(path: Path) -> None:
-    """Raise unless a file has what its header tells, and its faces have vertices that exist."""
+    """Raise `SceneError` unless the size fits the header, and faces have existing vertices."""
     try:
         with open_regular(path) as stream:
             content = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
@@ -138,7 +138,7 @@ def _ply_elements(lines: list[list[str]], order: str) -> list[_Element]:
 
 
 def _extended(element: _Element, columns: list[Any]) -> _Element:
-    """Return an element with more columns; only those of faces keep their names."""
+    """Return an element with more columns; only columns of faces keep their names."""
     old = element.row.descr if element.row.names else []
     new = [
         (name if name in PLY_FACES else f"column {len(old) + i}", *kind)
@@ -186,7 +186,7 @@ def _ascii_indices(
 
 
 def _numbers(row: np.dtype[Any], columns: int) -> int:
-    """Return how many numbers the first columns of a row have."""
+    """Return the count of numbers in the first columns of a row."""
     return sum(int(np.prod(row[i].shape)) for i in range(columns))
 
 
@@ -197,7 +197,7 @@ def _check_size(needed: int, there: int) -> None:
 
 
 def _checked_obj(content: bytes, path: Path, *, flat: bool) -> bytes | None:
-    """Return the content with triangles for polygons of which the fan is wrong; None if none is."""
+    """Return the content with triangles for polygons whose fan is wrong; None if no fan is."""
     smooth = not flat and bool(_OBJ_NORMAL.search(content))
     plain = len((_OBJ_SMOOTH if smooth else _OBJ_TRIANGLE).findall(content))
     if plain and plain == len(_OBJ_FACE.findall(content)):
@@ -220,7 +220,7 @@ def _line(content: bytes, match: re.Match[bytes]) -> int:
 
 
 def _corners(words: bytes, *, smooth: bool) -> list[bytes]:
-    """Return the corners of a face, up to what is none; those of a smooth mesh have normals."""
+    """Return the corners of a face up to the first other word; smooth meshes need normals."""
     found = []
     for word in words.split():
         if word.startswith(b"-"):
@@ -236,7 +236,7 @@ def _corners(words: bytes, *, smooth: bool) -> list[bytes]:
 def _cut(
     content: bytes, path: Path, faces: list[re.Match[bytes]], corners: list[list[bytes]]
 ) -> bytes | None:
-    """Write triangles for polygons of which the fan is wrong, or whose line is too long."""
+    """Return the content with triangles for polygons whose fan is wrong or whose line is long."""
     if not faces:
         return None
     words = [match[1].decode(errors="replace") for match in _OBJ_VERTEX.finditer(content)]

@@ -42,7 +42,7 @@ MAX_NAMED = 8
 
 
 class _Loaded(NamedTuple):
-    """A shape, what Mitsuba shows of it, and the element that it comes from, or its name."""
+    """A shape, its surface in Mitsuba, and its element or its name."""
 
     shape: Shape
     surface: Surface
@@ -50,7 +50,7 @@ class _Loaded(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its name for people; to find the line of an element takes a look at the whole file."""
+        """Its name in messages; finding an element's line takes a search of the file."""
         return self.origin if isinstance(self.origin, str) else self.origin.name
 
     def differences(self) -> Iterator[str]:
@@ -76,9 +76,9 @@ def from_mitsuba(source: str | PathLike[str] | dict[str, Any]) -> Scene:
     Left out is what belongs to rendering: integrator, sampler, reconstruction filter (drpt's is a
     box) and clip planes.
 
-    Files are looked at before Mitsuba reads them. Polygons of OBJ files that no fan fits are cut
-    into other triangles than Mitsuba's. Elements may stand 100 deep in each other, and up to 1000
-    files may be included.
+    Files are checked before Mitsuba reads them. Polygons of OBJ files for which a fan is wrong are
+    cut into other triangles than Mitsuba's. Elements may be nested 100 deep, and up to 1000 files
+    may be included.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 VARIANCE = "variance"
 """Name of the layer that holds the variance of the mean."""
 CALIBRATION = 1.4
-"""The variance that a picture tells of itself may be too small by this factor.
+"""Factor by which a picture's own estimate of its variance may be too small.
 
 See docs/explanation/error.md, where it is measured.
 """
@@ -53,12 +53,12 @@ def _noise_layer(estimate: Estimate) -> dict[str, NDArray[np.float32]]:
 def load_estimate(path: str | PathLike[str]) -> tuple[Estimate, dict[str, str | int | float]]:
     """Read an estimate and its metadata.
 
-    The noise is that of the layer ``variance``, or else ``standard_error``, which drpt gives every
-    picture. Without passes it was estimated from the samples of one, and its variance counts as
-    `CALIBRATION` times what the layer says, as sure as that of `PASSES`. Without either layer the
-    variance is not a number. Raises `ValueError` and `OSError` like :func:`drpt.output.read_exr`,
-    and `ValueError` where radiance or noise is negative or not finite, or the metadata is not what
-    it must be.
+    The noise is taken from the layer ``variance``, or else from ``standard_error``, which every
+    picture of drpt has. A ``standard_error`` without passes was estimated within one render: its
+    square is multiplied by `CALIBRATION`, and treated as an estimate from `PASSES`. Without either
+    layer the variance is not a number. Raises `ValueError` and `OSError` like
+    :func:`drpt.output.read_exr`, and `ValueError` if radiance or noise is negative or not finite,
+    or the metadata is not allowed.
     """
     layers, metadata = read_exr_layers(path)
     mean = _checked(layers["RGB"], path, "radiance")

@@ -1,7 +1,7 @@
-"""Looks at Mitsuba's scene files before Mitsuba does, whose parser trusts them.
+"""Checks Mitsuba's scene files before Mitsuba's parser, which trusts them, reads them.
 
-Mitsuba's parser calls itself for each level of elements, reads a file as often as it is included,
-and puts values into other values, so that a small file can end the process or take all memory.
+The parser recurses for each level of elements, reads a file as often as it is included, and
+substitutes values in other values. So a small file can crash the process or use all memory.
 """
 
 from __future__ import annotations
@@ -21,15 +21,16 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 MAX_BYTES = 2**30
-"""Largest scene file, with all that it includes; a million shapes take some 500 MB."""
+"""Largest size of a scene file with all included files; a million shapes take about 500 MB."""
 MAX_DEPTH = 100
-"""Elements within elements; Mitsuba ends the process from some thousand on."""
+"""Largest depth of nested elements; Mitsuba crashes from some thousand on."""
 MAX_INCLUDES = 1000
-"""Files that are included, counted as often as they are."""
+"""Largest number of includes, with repetitions."""
 MAX_PARAMETERS = 1000
-"""Elements <default> with different names: each is searched for in every value."""
+"""Largest number of <default> elements with different names; Mitsuba searches every value for each
+of them."""
 MAX_VALUE = 10_000
-"""Characters of a value once its parameters stand in it."""
+"""Longest value, in characters, after the substitution of parameters."""
 
 _TAG = re.compile(
     rb"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)"
@@ -37,19 +38,19 @@ _TAG = re.compile(
     rb"(?P<rest>(?:[^>\"']++|\"[^\"]*+(?:\"|\Z)|'[^']*+(?:'|\Z))*+)(?:>|\Z)",
     re.DOTALL,
 )
-"""A comment, CDATA, an instruction, or a tag; what is not closed goes on to the end of the file."""
+"""A comment, CDATA, an instruction or a tag; without its end, it extends to the end of the file."""
 _ATTRIBUTE = re.compile(rb"([^\s=\"']++)\s*+=\s*+(?:\"([^\"]*+)\"|'([^']*+)')")
 _FOLLOWED = (b"default", b"include", b"path", b"spectrum")
 """Elements that name files or parameters."""
 
 
 def check_xml(mi: Any, path: Path) -> None:
-    """Raise `SceneError`, which names the place, if a scene file is none for Mitsuba's parser."""
+    """Raise `SceneError`, with file and line, if a scene file is unsafe for Mitsuba's parser."""
     _Reader(mi).read(path, mi.file_resolver())
 
 
 def check_dict(table: dict[str, Any]) -> None:
-    """Raise `SceneError` if a dict holds itself, or dicts too deep within dicts."""
+    """Raise `SceneError` if dicts are nested too deep, or without an end."""
     level: list[Any] = [table]
     for _ in range(MAX_DEPTH):
         inner = {id(x): x for node in level for x in node.values() if isinstance(x, dict)}
@@ -60,9 +61,9 @@ def check_dict(table: dict[str, Any]) -> None:
 
 
 def check_file(resolver: Any, name: str) -> Path:
-    """Return the path that a name in a scene stands for.
+    """Return the path of a file name in a scene.
 
-    Raises `SceneError` if there is something that is no regular file.
+    Raises `SceneError` if the path exists and is not a regular file.
     """
     path = Path(str(resolver.resolve(name)))
     try:
@@ -105,7 +106,7 @@ class _Reader:
         self.open_files.pop()
 
     def _follow(self, name: bytes, rest: bytes, resolver: Any) -> None:
-        """Do what an element does to parameters, paths and files."""
+        """Apply an element's effect on parameters, paths and files."""
         values = {key: self._value(value) for key, value in _attributes(rest)}
         file, value = values.get("filename"), values.get("value", "")
         if name == b"default" and "name" in values:
@@ -136,7 +137,7 @@ class _Reader:
         self.parameters = {n: self.parameters.get(n, value) for n in names}
 
     def _value(self, text: str) -> str:
-        """Return a value with its parameters in it, as Mitsuba puts them there."""
+        """Return a value with its parameters substituted, as Mitsuba does."""
         for name, value in self.parameters.items() if "$" in text else ():
             if f"${name}" in text:
                 parts = re.split(rf"(?<!\\)\${re.escape(name)}", text)
@@ -148,7 +149,7 @@ class _Reader:
 
 @contextmanager
 def _blamed(content: bytes, start: int, name: bytes) -> Iterator[None]:
-    """Put the line and the tag of an element into the field of an error without a file."""
+    """Add line and tag of an element to the field of an error that does not name a file."""
     try:
         yield
     except SceneError as error:
@@ -159,7 +160,7 @@ def _blamed(content: bytes, start: int, name: bytes) -> Iterator[None]:
 
 
 def _elements(content: bytes) -> Iterator[tuple[int, bytes, bytes]]:
-    """Yield where each element starts, its name, and what else stands in its tag."""
+    """Yield the start of each element, its name, and the rest of its tag."""
     depth = 0
     for tag in _TAG.finditer(content):
         if tag["name"] is None:

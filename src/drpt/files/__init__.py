@@ -1,4 +1,4 @@
-"""Files: read only if they are regular and not too large, written whole or not at all."""
+"""Files: only regular ones of limited size are read, and each is written whole or not at all."""
 
 from drpt.files.archives import read_npy, read_npz
 from drpt.files.locking import PathLock

@@ -1,7 +1,7 @@
-"""NumPy's files from anywhere: arrays are looked at before memory is taken for them.
+"""Reads untrusted NumPy files: headers are checked before memory is allocated.
 
-The header of an array of a few bytes can tell of any shape, and a few bytes of a compressed archive
-can unpack to any size.
+The header of a small file can claim any shape, and a few bytes of a compressed archive can unpack
+to any size.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 RATIOS = {ZIP_STORED: 1, ZIP_DEFLATED: 1032}
 """Largest ratio of the size of an array to that in the archive; DEFLATE's best is 1032."""
 MAX_PROBLEM = 200
-"""Characters of what the libraries say, which may repeat the file."""
+"""Characters of a library's message that an error shows; it may quote the file."""
 
 
 def read_npz(stream: BinaryIO) -> dict[str, NDArray[Any]]:
@@ -38,7 +38,7 @@ def read_npz(stream: BinaryIO) -> dict[str, NDArray[Any]]:
                 member.filename.removesuffix(".npy"): _read_member(archive, member)
                 for member in members
             }
-    except Exception as error:  # zipfile and NumPy let many through
+    except Exception as error:  # zipfile and NumPy raise many kinds
         problem = one_line(shortened(str(error), MAX_PROBLEM))
         raise ValueError(f"it is not an NPZ file of plain arrays: {problem}") from error
 
@@ -49,7 +49,7 @@ def read_npy(stream: BinaryIO) -> NDArray[Any]:
         _check_header(stream, _size(stream))
         stream.seek(0)
         return _plain(stream)
-    except Exception as error:  # NumPy lets many through
+    except Exception as error:  # NumPy raises many kinds
         problem = one_line(shortened(str(error), MAX_PROBLEM))
         raise ValueError(f"this is not a readable NPY file ({problem})") from error
 
@@ -61,7 +61,7 @@ def _size(stream: BinaryIO) -> int:
 
 
 def _check_sizes(members: list[ZipInfo], archive_size: int) -> None:
-    """Raise `ValueError` where members tell of more than the archive, or the memory, can hold."""
+    """Raise `ValueError` if members claim more bytes than the archive or the memory can hold."""
     for member in members:
         name = shortened(member.filename, MAX_PROBLEM // 4)
         ratio = RATIOS.get(member.compress_type)
@@ -85,7 +85,7 @@ def _read_member(archive: ZipFile, member: ZipInfo) -> NDArray[Any]:
 
 
 def _check_header(stream: Any, size: int) -> None:
-    """Raise `ValueError` unless the shape in an array's header is that of what follows."""
+    """Raise `ValueError` unless as many bytes follow an array's header as its shape needs."""
     version = np.lib.format.read_magic(stream)
     headers = {
         (1, 0): np.lib.format.read_array_header_1_0,

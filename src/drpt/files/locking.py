@@ -1,6 +1,6 @@
-"""Locks that the operating system drops with the process that holds them.
+"""File locks that the operating system releases when their process ends.
 
-Source: flock(2); two locks of one process on different descriptors exclude each other, too.
+Source: flock(2). Two descriptors in one process exclude each other, too.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ _FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 def try_lock(descriptor: int) -> bool:
-    """Lock an open file unless another descriptor has; raises `OSError` where there are no locks.
+    """Lock an open file; return whether that succeeds, which it does unless it is locked already.
 
-    The lock ends where the descriptor is closed.
+    Closing the descriptor releases the lock. Raises `OSError` if the file system has no locks.
     """
     from filelock import lock_descriptor
 
@@ -34,14 +34,14 @@ def is_at(descriptor: int, path: Path) -> bool:
 
 
 def open_existing(path: Path) -> int:
-    """Open a file to lock it; it is neither a link nor waited for."""
+    """Open a file to lock it, without following a link or waiting for a pipe."""
     return os.open(path, os.O_RDWR | _FLAGS)
 
 
 class PathLock:
-    """A lock that is known by the path of a file, which is there as long as it is held.
+    """A lock on a path, where a file exists as long as the lock is held.
 
-    A process that is killed leaves the file, without a lock; who locks it next removes it.
+    A killed process leaves the file, unlocked; the next owner of the lock removes it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -50,11 +50,11 @@ class PathLock:
 
     @property
     def is_held(self) -> bool:
-        """Whether this object holds it."""
+        """Whether this object holds the lock."""
         return self._release is not None and self._release.alive
 
     def acquire(self) -> bool:
-        """Lock it unless it is locked already; raises `OSError` where that is not possible."""
+        """Return whether the lock was free and is now held; raises `OSError` without locks."""
         while True:
             descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | _FLAGS, 0o666)
             try:
@@ -70,13 +70,13 @@ class PathLock:
                 return False
 
     def release(self) -> None:
-        """Let others have it, and remove its file."""
+        """Release the lock and remove its file."""
         if self._release:
             self._release()
 
 
 def _remove(descriptor: int, path: Path, process: int) -> None:
-    """Remove a locked file and close it; a fork of the process that has locked it does neither."""
+    """Remove a locked file and close it; does nothing in a fork of the process that locked it."""
     if os.getpid() == process:
         try:
             if is_at(descriptor, path):

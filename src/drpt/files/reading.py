@@ -1,4 +1,4 @@
-"""Files that come from anywhere: only regular ones are opened, and no more is read than allowed."""
+"""Reads untrusted files: only regular ones are opened, and the number of bytes is limited."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     Path = str | PathLike[str]
 
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
-"""Do not wait for the other end of a pipe; Windows has neither the flag nor such files."""
+"""Flag against waiting for the other end of a pipe; Windows has neither."""
 
 
 def open_regular(path: Path) -> BinaryIO:
     """Open a regular file to read its bytes.
 
-    Raises `OSError` with a readable ``strerror`` where there is none, or where it is a folder, a
-    pipe, a socket or a device, none of which is waited for.
+    Raises `OSError` with a readable ``strerror`` if there is no file, or if it is a folder, a pipe,
+    a socket or a device. It never waits.
     """
     try:
         check_regular(path, os.stat(path))  # opening a device may already change it
@@ -57,9 +57,9 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def _read(stream: BinaryIO, size: int, most: int) -> bytes:
-    """Return what a file of a known size has, and what it grows by, but ``most + 1`` at the most.
+    """Return the content of a file that may grow, at most ``most + 1`` bytes.
 
-    Python reserves memory for all bytes that it is asked for, whether they are there or not.
+    It is read in parts, as Python allocates memory for all requested bytes, also for missing ones.
     """
     content = stream.read(size + 1)
     while size < len(content) <= most:
@@ -69,7 +69,7 @@ def _read(stream: BinaryIO, size: int, most: int) -> bytes:
 
 
 def check_regular(path: Path, found: os.stat_result) -> None:
-    """Raise `OSError` unless what was found at a path is a regular file."""
+    """Raise `OSError` unless the status of a path is that of a regular file."""
     if stat.S_ISDIR(found.st_mode):
         problem = "this is a folder, and it must be a file"
         raise IsADirectoryError(errno.EISDIR, problem, os.fspath(path))

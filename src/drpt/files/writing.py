@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 BLOCK = 4096
-"""Bytes that a disk must have left."""
+"""Number of bytes that must be free on the disk."""
 ABANDONED_AFTER = 24 * 3600.0
-"""Seconds without a change after which nobody of another host writes a file any more."""
+"""Seconds without a change after which a temporary file of another host counts as abandoned."""
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 
 
@@ -55,8 +55,8 @@ def check_file(path: Path) -> None:
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """Open a new file that takes the place of `path` once it is written without an error.
 
-    Until then it has a name of its own, in the same folder. Its mode is that of the file before,
-    and when it is in place the disk has it. Files that killed processes have left there go.
+    Until then it has a temporary name in the same folder. It gets the mode of the old file, and is
+    synchronised to the disk. Temporary files of killed processes in the folder are removed.
     """
     target = _target(path)
     try:
@@ -83,7 +83,7 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def _create(folder: Path) -> tuple[BinaryIO, Path]:
-    """Make a file that is locked while it is open, so that it is known to be in use."""
+    """Create a temporary file that is locked while it is open, which marks it as in use."""
     while True:
         path = folder / f".drpt-{_HOST}-{secrets.token_hex(8)}.tmp"
         stream = open(path, "x+b")  # noqa: SIM115 -- the caller closes it
@@ -92,13 +92,13 @@ def _create(folder: Path) -> tuple[BinaryIO, Path]:
                 return stream, path
         except OSError:  # the file system has no locks
             return stream, path
-        stream.close()  # another process has taken it for abandoned before it was locked
+        stream.close()  # another process removed it before it was locked
 
 
 def _remove_abandoned(folder: Path) -> None:
-    """Remove files that `_create` has made for processes that have ended."""
+    """Remove temporary files of processes that have ended."""
     for path in folder.glob(".drpt-*.tmp"):
-        with suppress(OSError):  # it has gone, or belongs to somebody else
+        with suppress(OSError):  # it is gone, or another user owns it
             descriptor = open_existing(path)
             try:
                 if _is_abandoned(descriptor, path):
@@ -108,9 +108,9 @@ def _remove_abandoned(folder: Path) -> None:
 
 
 def _is_abandoned(descriptor: int, path: Path) -> bool:
-    """Whether nobody writes a file: nobody of this host locks it, or it is old.
+    """Whether no process writes a temporary file: it is unlocked, or it is old.
 
-    Locks of other hosts may be unknown here, those of a network's file system above all.
+    On network file systems, locks of other hosts may be invisible, so their files must be old, too.
     """
     is_old = time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER
     try:
@@ -126,7 +126,7 @@ def _keep_mode(stream: BinaryIO, target: Path) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the disk know the names in a folder, where that can be asked for."""
+    """Synchronise the names in a folder to the disk, if the system can."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:

@@ -1,7 +1,6 @@
-"""How large the pictures of an EXR file are, by its header alone.
+"""Checks the size of the pictures in an EXR file by its header.
 
-A header of a few bytes can tell of any size, and a reader takes memory for it before it finds that
-the pixels are not there.
+A small header can claim any size, and readers allocate memory before they find the pixels missing.
 """
 
 from __future__ import annotations
@@ -17,21 +16,20 @@ if TYPE_CHECKING:
     Header = Mapping[str, Any]
 
 RATIOS = {"NO": 1, "RLE": 64, "ZIPS": 1032, "ZIP": 1032, "PXR24": 1376}
-"""Largest ratio of pixels to bytes of the file: a run of 127 bytes takes 2, DEFLATE's best is 1032,
-and PXR24 takes a byte of four away before it."""
+"""Largest compression ratio of each method: RLE stores a run of 127 bytes in 2, DEFLATE reaches
+1032, and PXR24 drops one byte of four before DEFLATE."""
 OTHER_RATIO = 2**17
-"""Of other compressions, which hold areas of one colour in next to nothing: DWA compresses the
-mean of 64 half floats by DEFLATE."""
+"""Largest ratio of other methods; DWA compresses the mean of 64 half floats by DEFLATE."""
 CHUNK = 16
-"""Bytes of the file that a chunk takes at least: its offset, its first row and its size."""
+"""Smallest size of a chunk in the file, in bytes: its offset, its first row and its size."""
 MOST_ROWS = 256
-"""Rows of a chunk, at most."""
+"""Largest number of rows of a chunk."""
 COPIES = 3
-"""Arrays of the pixels that there are at the same time while a picture is read."""
+"""Number of copies of the pixels in memory while a picture is read."""
 FLOAT = 4
 """Bytes of a value in memory."""
 HALVES = 2
-"""Times as many bytes in memory as half floats take in a file."""
+"""Ratio of bytes in memory to those of half floats in a file."""
 
 
 def check_size(parts: Iterable[Header], file_size: int) -> None:

@@ -1,7 +1,7 @@
-"""What stands beside a picture in its file: names, types and bounds, written and read here alone.
+"""Metadata of picture files: names, types and ranges of the attributes, read and written.
 
-Attributes of a file are text: numbers and truth values as JSON, other texts as they are, or as
-JSON where they would be mistaken for one of those.
+Attributes are texts. Numbers and truth values are JSON. Other texts are stored verbatim, or as JSON
+if they look like one of those.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ MAX_SHOWN = 60
 
 _PREFIX = "drpt:"
 _NAME = re.compile("[ -~]{1,64}")
-"""Names that every format can hold, PNG too."""
+"""Names that every format can store, PNG included."""
 _SCALAR = re.compile(r'-?[0-9].*|true|false|NaN|-?Infinity|".*', re.DOTALL)
 
 
 class Allowed(NamedTuple):
-    """Values that an attribute may have: a predicate, and the same in words."""
+    """The allowed values of an attribute, as a predicate and in words."""
 
     test: Callable[[Any], bool]
     words: str
@@ -65,7 +65,7 @@ ATTRIBUTES = {
         "a whole number, or several of a merged picture",
     ),
 }
-"""What drpt reads again; others may be any text or number."""
+"""Allowed values of the attributes that drpt reads; others may be any text or number."""
 
 
 def to_header(metadata: Metadata) -> dict[str, str]:
@@ -74,10 +74,9 @@ def to_header(metadata: Metadata) -> dict[str, str]:
 
 
 def from_header(header: Mapping[str, Any]) -> dict[str, str | int | float]:
-    """Return the metadata among the attributes of a file: what `to_header` was given.
+    """Return the metadata among the attributes of a file, as `to_header` got it.
 
-    Attributes of other programs are left out; raises `ValueError` where one of drpt's is not what
-    it must be.
+    Attributes of other programs are left out. Raises `ValueError` if a value is not allowed.
     """
     return {
         name.removeprefix(_PREFIX): _value(name, attribute)

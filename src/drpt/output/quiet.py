@@ -1,4 +1,4 @@
-"""Libraries that print by themselves, kept from it."""
+"""Suppresses the output of libraries that print messages."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ _LOCK = Lock()
 
 @contextmanager
 def nothing_printed() -> Iterator[None]:
-    """Discard what anything in this process writes to stdout and stderr meanwhile.
+    """Discard all output of this process to stdout and stderr meanwhile.
 
-    OpenEXR does so in three ways: through C, through C++ and through Python.
-
-    That is for short calls: what other threads print is lost, too.
+    OpenEXR prints through C, C++ and Python. Output of other threads is lost, too, so wrap short
+    calls only.
     """
     with _LOCK:
         kept = [(stream, os.dup(stream)) for stream in _STREAMS if _is_open(stream)]
@@ -43,7 +42,7 @@ def nothing_printed() -> Iterator[None]:
 
 
 def _flush() -> None:
-    """Write what waits in the buffers of Python and of C."""
+    """Flush the buffers of Python and of C."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None and not stream.closed:
             stream.flush()

@@ -37,8 +37,6 @@ OBJ_IGNORED = ("g", "l", "mg", "mtllib", "o", "p", "s", "usemtl", "vp", "vt")
 PLY_FACES = ("vertex_index", "vertex_indices")
 NO_FACES = "it has no faces"
 SAME_SIZE = "in a binary PLY file all faces must have the same number of vertices"
-
-
 MAX_BYTES = 2**32
 """Largest mesh file: 50 million vertices take 2 GB as an OBJ, and their arrays as much."""
 
@@ -98,7 +96,7 @@ def _read_ply(content: bytes, path: Path) -> MeshArrays:
 
 
 def _ply_places(content: bytes, elements: Mapping[str, dict[str, Any]]) -> Callable[[int], str]:
-    """Return what names the place of a face: its line if the file is text, else its number."""
+    """Return a function from a face's number to its line in a text file, or else its number."""
     if b"\nformat ascii" not in content[:1000]:
         return lambda number: f"face {number}"
     before = content[: content.index(b"end_header")].count(b"\n") + 2
@@ -161,8 +159,8 @@ def _obj_geometry(text: str, path: Path) -> str:
     """Return the lines of an OBJ file that hold vertices, normals and faces, for trimesh.
 
     Relative indices become absolute. What trimesh would leave out or read wrong without an error is
-    refused: unknown keywords, index 0, and normals at some corners only. Polygons of which the fan
-    is wrong become triangles.
+    refused: unknown keywords, index 0, and normals at some corners only. Polygons whose fan is
+    wrong become triangles.
     """
     lines: list[str] = []
     polygons: dict[int, int] = {}  # from indices of lines to their numbers in the file
@@ -192,7 +190,7 @@ def _obj_geometry(text: str, path: Path) -> str:
 
 
 def _cut_polygons(lines: list[str], polygons: Mapping[int, int], path: Path) -> None:
-    """Write polygons of which the fan is wrong as triangles; ``polygons`` are numbers of lines."""
+    """Replace polygons with a wrong fan by triangles; ``polygons`` maps indices to line numbers."""
     places = [line for line in lines if line.startswith("v ")]
     if not places:
         raise SceneError("it has no vertices")

@@ -1,4 +1,4 @@
-"""What a scene file calls its materials and meshes; the model has no names."""
+"""Names of materials and meshes in a scene file; the model has no names."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Names:
     Attributes
     ----------
     materials
-        The materials that have a name, used or not.
+        All materials that have a name, by name.
     of_shapes
-        For each shape the name of its material; None for lights, and for a material in its place.
+        Name of each shape's material; None for lights and for materials without a name.
     files
-        For each shape the file of its mesh as the scene file names it; None for other shapes.
+        Path of each shape's mesh file as the scene file spells it; None for other shapes.
     """
 
     materials: Mapping[str, Material]
@@ -33,8 +33,8 @@ class Names:
     def after_changes(self, scene: Scene) -> Names:
         """Return the names for a scene of the same shapes, whose materials may have changed.
 
-        A name follows its material if all of its shapes changed alike. Otherwise it stays with the
-        old material, and the materials that changed lose it.
+        If all shapes of a material changed in the same way, its name goes to the new material.
+        Otherwise it stays with the old material, and the changed materials have no name.
         """
         materials, of_shapes = dict(self.materials), list(self.of_shapes)
         users = defaultdict(list)
@@ -53,7 +53,7 @@ class Names:
 
 
 def numbered(scene: Scene) -> Names:
-    """Return names for a scene that came without: materials in the order of their first use."""
+    """Return names for a scene without any; materials are numbered in the order of first use."""
     used = dict.fromkeys(shape.material for shape in scene.shapes if shape.material)
     names = {material: f"material-{n}" for n, material in enumerate(used, start=1)}
     of_shapes = tuple(names[shape.material] if shape.material else None for shape in scene.shapes)

@@ -1,8 +1,8 @@
-"""Polygons of mesh files as triangles.
+"""Triangulates polygons of mesh files.
 
-A polygon whose corners, seen from the first one, follow each other counter-clockwise is cut into
-the fan of that corner; so is every convex polygon. All others are cut by ears (mapbox-earcut), in
-the coordinate plane that they face most.
+If the other corners of a polygon follow each other counter-clockwise around the first one, as in
+every convex polygon, it is cut into the fan of that corner. Other polygons are cut by ear clipping
+(mapbox-earcut), projected to the coordinate plane that is nearest to theirs.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ if TYPE_CHECKING:
 CROSSED = "intersects itself"
 BENT = "is far from planar"
 MAX_BEND = 0.05
-"""Largest distance of a corner from a polygon's mean plane, relative to the polygon's extent, at
-which it passes for planar: a square folded along its diagonal by 22 degrees."""
+"""Largest distance of a corner from the mean plane of a planar polygon, relative to its extent, as
+in a square that is folded along its diagonal by 22 degrees."""
 MIN_SINE = 1e-6
-"""Sine of the angle at the first corner below which a fan's triangle is too thin: where files give
-seven digits, the side that it faces is chance."""
+"""Smallest sine of a fan triangle's angle at the first corner. In files with seven digits, rounding
+decides which side a thinner triangle faces."""
 SLIVER = 1e-3
-"""Height of a triangle, relative to its longest edge, below which that edge may be turned."""
+"""Height of a triangle, relative to its longest edge, below which that edge may be flipped."""
 ROUNDING = 1e-12
-"""Some hundred roundings of float64: relative areas below this are taken as 0."""
+"""Relative areas below this count as 0: several thousand roundings of float64."""
 MAX_COMPARED = 1000
-"""Corners up to which all pairs of edges are tested for an intersection. In polygons with more,
-only the area shows one: the triangles' areas do not sum up to the polygon's."""
+"""Up to this number of corners, all pairs of edges are tested for an intersection. In larger
+polygons only a wrong sum of the triangles' areas reveals one."""
 
 
 class Triangulation(NamedTuple):
-    """Triangles of polygons whose corners are numbered through.
+    """Triangles of several polygons, whose corners have consecutive numbers.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Triangulation(NamedTuple):
     fanned
         Whether a polygon is cut into the fan of its first corner, (n,).
     flaws
-        What is wrong with some of the polygons, by their number.
+        `CROSSED` or `BENT` for each polygon with such a flaw, by number.
     """
 
     corners: Integers
@@ -64,9 +64,10 @@ class Triangulation(NamedTuple):
 
 
 def triangulate(points: Floats, sizes: Integers) -> Triangulation:
-    """Cut polygons into triangles; ``points`` (k, 3) are the corners of one after the other.
+    """Cut polygons into triangles.
 
-    ``sizes`` (n,) are their numbers of corners, three or more. A repeated corner is left out.
+    ``points`` (k, 3) are the corners of all polygons in order, and ``sizes`` (n,) their numbers of
+    corners, three or more. Repeated corners are left out.
     """
     starts = np.cumsum(sizes) - sizes
     fanned = np.ones(len(sizes), bool)
@@ -96,7 +97,7 @@ def triangulate(points: Floats, sizes: Integers) -> Triangulation:
 
 
 def warn_of_flaws(path: Path, flaws: Mapping[str, str]) -> None:
-    """Warn once of each kind of flaw; ``flaws`` are by the place in the file."""
+    """Give one warning for each kind of flaw; the keys of ``flaws`` are places in the file."""
     for flaw in dict.fromkeys(flaws.values()):
         places = [place for place, found in flaws.items() if found == flaw]
         more = f" (the first of {len(places)})" if len(places) > 1 else ""
@@ -113,8 +114,8 @@ def fan(size: int) -> Integers:
 
 
 def _judged(polygons: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell of polygons (m, k, 3) whether the first corner's fan is right, and which are bent."""
-    with np.errstate(all="ignore"):  # what is not finite is not right, and not bent
+    """Return which polygons (m, k, 3) have a correct fan, and which are far from planar."""
+    with np.errstate(all="ignore"):  # polygons that are not finite are neither
         spokes = polygons[:, 1:] - polygons[:, :1]
         spokes = spokes / np.abs(spokes).max(axis=(1, 2), keepdims=True)
         areas = np.cross(spokes[:, :-1], spokes[:, 1:])
@@ -132,7 +133,7 @@ def _judged(polygons: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
 
 
 def _cut(points: Floats) -> tuple[Integers, bool]:
-    """Cut one polygon (k, 3) by ears; tell whether it intersects itself."""
+    """Clip the ears of a polygon (k, 3); return triangles, and whether it intersects itself."""
     if not np.isfinite(points).all():
         return fan(len(points)), False
     kept = np.flatnonzero((points != np.roll(points, 1, axis=0)).any(axis=1))
@@ -167,11 +168,11 @@ def _flattened(points: Floats) -> Floats | None:
 
 
 def _without_slivers(flat: Floats, triangles: Integers) -> Integers:
-    """Turn the longest edges of slivers to the corners beyond them, where that is thicker."""
+    """Flip the longest edges of slivers where that gives thicker triangles."""
     thin = np.flatnonzero(_heights(flat, triangles) < SLIVER).tolist()
     corners = triangles.tolist()
     at = {edge: index for index, triangle in enumerate(corners) for edge in _edges(triangle)}
-    for _ in range(2 * len(corners) if thin else 0):  # nearly always each sliver is turned once
+    for _ in range(2 * len(corners) if thin else 0):  # nearly always, each sliver is flipped once
         first = thin.pop()
         u, v, w = _longest_first(flat, corners[first])
         second = at.get((v, u))
@@ -210,7 +211,7 @@ def _heights(flat: Floats, triangles: Integers) -> Floats:
 
 
 def _crossed(flat: Floats, covered: float) -> bool:
-    """Tell whether a polygon (k, 2) intersects itself; `covered` is its triangles' area, twice."""
+    """Return whether a polygon (k, 2) intersects itself; `covered` is twice its triangles' area."""
     following = np.roll(flat, -1, axis=0)
     area = float(_areas(np.zeros(2), flat, following).sum())
     if abs(covered - area) > ROUNDING * len(flat) * max(covered, area):

@@ -1,4 +1,4 @@
-"""The bytes of files that a scene is made of; what is wrong with a file is a `SceneError`."""
+"""Reads the files of a scene; every problem is a `SceneError`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def read_file(path: Path, most: int) -> bytes:
     """Return the content of a regular file of at most ``most`` bytes.
 
-    Raises `SceneError`, which does not name the file, where that is not possible.
+    Raises `SceneError`, which does not name the file, if it cannot be read.
     """
     try:
         return read_bytes(path, most)

@@ -1,7 +1,7 @@
-"""TOML from anywhere, parsed in time and memory that are linear in its size.
+"""Parses untrusted TOML in time and memory that are linear in its size.
 
-Python's parser takes time that is quadratic in the parts of a dotted key, and its result may be
-nested deeper than Python's own functions can follow. Both are bounded before it is called.
+Python's parser needs quadratic time for the parts of a dotted key, and returns tables nested deeper
+than Python's recursion limit. Both are limited before it is called.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MAX_NESTING = 16
 MAX_WORD = 1000
 """Characters of a number or of a key without quotes; Python prints integers of 4300 digits."""
 MAX_PROBLEM = 200
-"""Characters of what the parser says, which may repeat the file."""
+"""Characters of the parser's message that an error shows; it may quote the file."""
 
 _TEXTS_AND_COMMENTS = re.compile(
     r"""
@@ -34,7 +34,7 @@ _TEXTS_AND_COMMENTS = re.compile(
     """,
     re.DOTALL | re.VERBOSE,
 )
-"""A text ends at its quotes; one that never ends is an error, so that what follows is no matter."""
+"""A string or a comment. A string without an end extends to the end of the file: it is an error."""
 _LONG_KEY = re.compile(rf"(?:\.[^.=,\n\[\]{{}}]*+){{{MAX_PARTS}}}")
 _LONG_WORD = re.compile(rf"[\w+-]{{{MAX_WORD + 1}}}", re.ASCII)
 
@@ -52,7 +52,7 @@ def parse_toml(content: bytes) -> dict[str, Any]:
 
 
 def _check_depth(text: str) -> None:
-    """Raise `SceneError` where a key, a number or the nesting is longer than any scene needs."""
+    """Raise `SceneError` if a key, a number or the nesting exceeds its limit."""
     bare = _TEXTS_AND_COMMENTS.sub(lambda found: "\n" * found[0].count("\n"), text)
     if key := _LONG_KEY.search(bare):
         raise _too_long(bare, key.start(), f"a key must have no more than {MAX_PARTS} parts")

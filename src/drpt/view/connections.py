@@ -1,6 +1,6 @@
-"""What the server does about clients that break a protocol, or do not do their part.
+"""Ends the connections of clients that violate a protocol or do not respond.
 
-Their connections end, and that is all: other clients notice nothing, and nothing is logged.
+Other clients are not affected, and nothing is logged.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from asyncio import Transport
 
 HTTP_SECONDS = 30.0
-"""After which an HTTP connection ends, whatever it waits for. The page and its files take a moment;
-a WebSocket, which begins as HTTP, lasts."""
+"""Longest duration of an HTTP connection in seconds. The page and its files take a moment. A
+WebSocket, which begins as HTTP, may last longer."""
 MAX_CONNECTIONS = 256
-"""At once: a browser opens up to seven for each session."""
+"""Largest number of connections at once; a browser opens up to seven for each session."""
 MAX_UNREAD_PONGS = 32
-"""Answers to pings that are added to what a client does not read."""
+"""Largest number of answers to pings that wait for a client that does not read."""
 INVALID_TEXT = 1007
 """Code of a close frame; source: RFC 6455, section 7.4."""
 
@@ -63,13 +63,13 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
         self._unread_pongs = 0
 
     def data_received(self, data: bytes) -> None:
-        """Take what a client sends; the first is its whole request."""
+        """Process data from a client; the first data must be the whole request."""
         super().data_received(data)
         if not self.handshake_initiated:
             self.transport.abort()
 
     def send_receive_event_to_app(self) -> None:
-        """Hand on a message, if a text is one."""
+        """Pass a message to the application, unless its text is not UTF-8."""
         try:
             if self.curr_msg_data_type == "text":
                 b"".join(self.frames).decode()
@@ -81,7 +81,7 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
             super().send_receive_event_to_app()
 
     def handle_ping(self) -> None:
-        """Answer a ping; a client that goes on asking and does not read is left."""
+        """Answer a ping; disconnect a client that sends many and does not read."""
         self._unread_pongs = 0 if self.writable.is_set() else self._unread_pongs + 1
         if self._unread_pongs > MAX_UNREAD_PONGS:
             self.transport.abort()

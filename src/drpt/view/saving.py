@@ -46,10 +46,10 @@ def picture_file(result: Result, stem: str, suffix: str, exposure: float) -> Fil
 
 
 def scene_file(shown: Scene, source: SceneFile) -> File:
-    """Return a scene with the size and the names of the file that it came from.
+    """Return a scene as a file, with the picture size and the names of its source.
 
-    That is a TOML file; if meshes are in files of their own, or large, it is zipped with them.
-    Files of meshes are copied as they are now. Raises `SceneError` if one cannot be read any more.
+    It is a TOML file, zipped with its meshes if these are large or in files of their own. Mesh
+    files are copied as they are now. Raises `SceneError` if one can no longer be read.
     """
     camera = source.scene.camera
     scene = shown.resized(camera.width, camera.height)
@@ -78,7 +78,7 @@ def _mesh(path: Path) -> bytes:
 
 
 def _inside(file: str) -> str:
-    """Name of a mesh inside an archive: its own, unless that leads out of the scene's folder."""
+    """Name of a mesh file in an archive: unchanged if it is inside the scene's folder."""
     path = PurePath(file)
     if path.is_absolute() or ".." in path.parts:
         digest = hashlib.sha256(file.encode()).hexdigest()[:8]

@@ -26,7 +26,7 @@ MESSAGE_BYTES = 2**16
 PATIENCE = 30
 """Seconds that a client may leave data untaken before it counts as gone."""
 PING_SECONDS = 20.0
-"""How often a WebSocket's client is asked for a sign of life, and how long it has to give one."""
+"""Interval of pings to a WebSocket's client, and the time that it has for an answer."""
 GRACE = 1
 """Seconds that clients have, when the server ends, to take what they have been sent."""
 

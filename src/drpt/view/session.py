@@ -166,7 +166,7 @@ class Session:
         return self.urgency() is not None
 
     def step(self) -> None:
-        """Do what waits first: heed a wish, send a frame, or take some more samples."""
+        """Do the first waiting step: handle a request, send a frame, or take more samples."""
         with self._lock:
             step = self._next_step()
         try:

@@ -1,8 +1,8 @@
-"""Fair shares of a thread's time: whoever asks for much delays nobody but themselves.
+"""Divides a thread's time fairly, so that expensive requests delay only their own session.
 
-Start-time fair queueing (Goyal, Vin and Cheng 1996), with the time that a step took in place of a
-packet's length, which is charged afterwards: a compilation cannot be interrupted, and nobody knows
-before how long it takes. What is new here is a lead for what somebody waits for.
+This is start-time fair queueing (Goyal, Vin and Cheng 1996). The time of a step replaces the length
+of a packet, and is charged afterwards: a compilation cannot be interrupted, and its time is not
+known in advance. In addition, urgent steps get a lead.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 MAX_DEBT = 2.5
-"""Seconds of use for which somebody waits at most, however long a step took: so many seconds each
-of the others gets meanwhile. Most compilations are shorter."""
+"""Largest debt of a member in seconds, however long its step took. Meanwhile each other member gets
+at most this time. Most compilations are shorter."""
 
 
 class Urgency(IntEnum):
-    """How much somebody waits for a step."""
+    """How urgently a user waits for a step."""
 
     REFINE = 0
-    """A picture that is seen gets better."""
+    """A visible picture gets more samples."""
     CHANGE = 1
-    """What was asked for is done."""
+    """A request is handled."""
     SHOW = 2
-    """A picture that is there, and that was not seen yet, is sent."""
+    """A first picture, which is ready, is sent."""
 
 
 LEAD = {Urgency.REFINE: 0.0, Urgency.CHANGE: 0.5, Urgency.SHOW: inf}
-"""By how many seconds of use a step comes before others: a change is seen soon, but whoever asks
-for one after the other gets no more time than the others. What is shown has been paid for."""
+"""Lead of a step before others, in seconds of use. A change is visible soon, but many changes get
+no more time than other members. The time for a first picture has been charged already."""
 
 
 class Shares(Generic[T]):
-    """Who of some members is served next."""
+    """Decides which of several members is served next."""
 
     def __init__(self) -> None:
         self._used: dict[T, float] = {}
@@ -50,7 +50,7 @@ class Shares(Generic[T]):
         return list(self._used)
 
     def join(self, member: T) -> None:
-        """Add a member, which has used as much as whoever waits and has used least."""
+        """Add a member, with the same use as the waiting member that has used least."""
         self._used[member] = self._now
 
     def leave(self, member: T) -> None:
@@ -65,7 +65,7 @@ class Shares(Generic[T]):
     def next(self, waiting: Mapping[T, Urgency]) -> T | None:
         """Return the member to serve next, of those that wait.
 
-        Whoever did not wait before saves no time for later: it starts at the present.
+        A member that did not wait before cannot save time: its use is raised to the present.
         """
         if not waiting:
             return None
