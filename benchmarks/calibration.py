@@ -1,4 +1,4 @@
-"""Whether standard errors are the true ones, in lights, beside them and elsewhere.
+"""Calibration of standard errors: in pixels that show lights, beside these, and elsewhere.
 
 A Markdown table: ``python -m benchmarks.calibration``, an hour; ``--seeds 64`` takes a quarter.
 A ratio is the mean squared standard error over the variance across the seeds, with an interval of
@@ -36,13 +36,13 @@ SPP = (16, 64, 256)
 SEEDS = 256
 BOUNDS = 0.7, 1.4
 LIGHT_SPP = 1024
-"""Samples that find the pixels that show a light at all."""
+"""Samples per pixel that find the pixels that show a light."""
 BESIDE = 2
-"""Pixels from a light that count as beside it."""
+"""Largest distance in pixels of a pixel beside a light."""
 NOTHING = 1e-6
-"""Largest standard error, relative to its value, of one that is equal in all pictures."""
+"""Largest relative standard error of a value that is equal in all pictures."""
 GROUPS = 16
-"""Parts of the seeds, whose ratios tell the interval."""
+"""Number of groups of seeds, whose ratios give the interval."""
 STUDENT_95 = 2.13
 """Half of an interval that covers 95 % of a t-distribution of `GROUPS` - 1 degrees of freedom."""
 

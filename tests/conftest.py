@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import settings
 
 from drpt.kernel import backend
 from tests.oracle.arrays import Floats
 
 TYPES = backend.load()
+settings.register_profile("drpt", deadline=None)  # a busy machine makes no test fail
+settings.load_profile("drpt")
 
 
 @pytest.fixture(autouse=True)

@@ -159,13 +159,13 @@ class TestCuda:
 class TestCache:
     def test_is_named(self, examine: Callable[..., doctor.Report]) -> None:
         report = examine()
-        assert found_as(report, "cache folder") == ["/home/someone/kernels (0 kernels, 0.0 MiB)"]
+        assert found_as(report, "cache folder") == ["/home/someone/kernels (0 kernels, 0 bytes)"]
         assert report.notes == []
 
     def test_tells_its_size(self, tmp_path: Path, examine: Callable[..., doctor.Report]) -> None:
         for name in ("a.bin", "b.bin", "sweep.stamp"):
             (tmp_path / name).write_bytes(bytes(2**20))
-        says = f"{tmp_path} (2 kernels, 2.0 MiB)"
+        says = f"{tmp_path} (2 kernels, 2.097 MB)"
         assert found_as(examine(cache=tmp_path), "cache folder") == [says]
 
     @pytest.mark.parametrize(

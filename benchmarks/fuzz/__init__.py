@@ -1,1 +1,1 @@
-"""Fuzzers: whatever a file holds, drpt reads it or refuses it in one line that names it."""
+"""Fuzzers: drpt must read any file, or refuse it with one line that names the file."""

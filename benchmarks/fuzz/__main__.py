@@ -19,7 +19,7 @@ def main() -> int:
     parser.add_argument("target", choices=TARGETS)
     parser.add_argument("--minutes", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--inputs", type=int, help="stop after so many, whatever the time")
+    parser.add_argument("--inputs", type=int, help="stop after this number of inputs")
     parser.add_argument("--write", type=int, metavar="INDEX", help="write that input to stdout")
     args = parser.parse_args()
     if args.write is not None:

@@ -1,4 +1,4 @@
-"""Which branches of modules a call takes."""
+"""Records which branches of modules a call takes."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _JUMPS_IF = re.compile("JUMP.*_IF|FOR_ITER")
 
 
 class Tracer:
-    """Notes branches of some modules that are taken, and whether a function is entered.
+    """Records the branches taken in some modules, and whether a function is entered.
 
     Attributes
     ----------
     branches
-        All branches between different lines that there are.
+        All branches between different lines.
     taken
         Those that were taken so far.
     entered
@@ -46,7 +46,7 @@ class Tracer:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Note what happens meanwhile."""
+        """Record branches meanwhile."""
         self.entered = False
         sys.settrace(self._enter)
         try:
@@ -76,7 +76,7 @@ class Tracer:
 def _branches_of(file: str) -> Iterator[Branch]:
     with open(file, encoding="utf-8") as stream:
         codes = [compile(stream.read(), file, "exec")]
-    for code in codes:  # which grows
+    for code in codes:  # the list grows meanwhile
         codes += [constant for constant in code.co_consts if isinstance(constant, CodeType)]
         yield from _jumps(file, code)
 

@@ -1,4 +1,4 @@
-"""Checkpoints with a valid checksum of whatever they hold, and some without."""
+"""Checkpoints with faults, most of them with a valid checksum."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _member(random: Random, array: Any) -> bytes:
 
 
 def call(path: Path) -> None:
-    """Read a checkpoint, and become the render that it tells of."""
+    """Read a checkpoint, and restore the film of its state."""
     saved = Checkpoint(path, IDENTITY, 1).load()
     assert saved is not None
     try:

@@ -1,4 +1,4 @@
-"""EXR files: attributes, channels, headers and pixels of other programs, or damaged."""
+"""EXR files whose attributes, channels, headers or pixels are unusual or damaged."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _with_window(content: bytes, random: Random) -> bytes:
 
 
 def call(path: Path) -> None:
-    """Read a picture, merge it, write it, and take it for a reference."""
+    """Read a picture, merge it, write it, and load it as a reference."""
     layers, attributes = read(path)
     comparison.differing_settings(attributes, {})
     image = layers.pop("RGB")

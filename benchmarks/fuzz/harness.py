@@ -1,4 +1,4 @@
-"""Runs a target for a time, counts what happens, and keeps the inputs that show a fault."""
+"""Runs a target for a time, counts the outcomes, and keeps inputs that show a fault."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from benchmarks.fuzz.target import Target
 
 OUT = Path("out/fuzz")
-"""Where inputs that show a fault are kept."""
+"""Folder for inputs that show a fault."""
 PATIENCE = 10 * SECONDS + 20
 """Seconds without an outcome, start included, after which a process is ended."""
 
 
 @dataclass
 class Report:
-    """What a run has found."""
+    """The findings of a run."""
 
     target: str
     seed: int

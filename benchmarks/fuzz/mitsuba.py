@@ -1,4 +1,4 @@
-"""Mitsuba's scene files, each with the mesh that it names after a null character."""
+"""Mitsuba's scene files, each followed by a null character and its mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Spheres from afar: what a camera sees of one of them, however many there are."""
+"""Distant spheres: the picture of one of them, alone or among many."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     """Centres of other spheres, so far away."""
 
 RADIUS = 1e-3
-"""Of the sphere at the origin, so that 1e9 of them are within the coordinates of a scene."""
+"""Radius of the sphere at the origin; 1e9 radii are within the coordinates of a scene."""
 ALONG = np.array([0.0, 0.0, 1.0])
-"""There float32 tells directions to the centre apart by 1e-45."""
+"""Direction near which float32 resolves directions to 1e-45."""
 ASKEW = np.array([0.36, 0.48, 0.8])
-"""There it tells them apart by 6e-8."""
+"""Direction near which it resolves them to 6e-8."""
 PHASE = 1.0
 """The angle between the camera and the light as a ball sees them, in radians."""
 AWAY = (1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
 PARALLEL = AWAY[1:]
-"""Whence light and views of a ball are parallel, to less than 1e-4."""
+"""Distances at which light and view rays of a ball are parallel within 1e-4."""
 NAIVE = "the point that is hit is rounded to the other side, which is black"
 
 
@@ -42,7 +42,7 @@ def alone(far: float) -> Floats:
 
 
 def scattered(far: float) -> Floats:
-    """So many as stand in a grid, far aside of what the camera sees."""
+    """Enough spheres for a grid, far outside the picture."""
     turns = 2 * pi * np.arange(1, 101) / 100
     aside = far * np.linspace(0.3, 0.9, 100)[:, None]
     ring = np.stack([np.cos(turns), np.sin(turns), 0.3 * np.sin(7 * turns)], axis=1)
@@ -50,7 +50,7 @@ def scattered(far: float) -> Floats:
 
 
 def crowded(far: float) -> Floats:
-    """So many in one place as stand in a tree."""
+    """Enough spheres in one place for a tree."""
     aside = np.array([0.5 * far, 0.3 * far, 0])
     return aside + RADIUS * np.random.default_rng(0).uniform(-1, 1, (300, 3))
 
@@ -59,18 +59,18 @@ LAYOUTS: dict[str, Place] = {"alone": alone, "in a grid": scattered, "in a tree"
 
 
 def camera(away: float, along: Floats, half: float) -> Camera:
-    """So many radii away, and seeing so many radii to each side of the origin."""
+    """A camera at a distance in radii, which sees ``half`` radii to each side of the origin."""
     eye = away * RADIUS * along
     return Camera(eye, (0, 0, 0), (0, 1, 0), degrees(2 * atan(half / away)), SIDE, SIDE)
 
 
 def others(place: Place, away: float) -> list[Sphere]:
-    """Black spheres beside the one at the origin."""
+    """Black spheres besides the one at the origin."""
     return [Sphere(p, RADIUS, material=Diffuse(0)) for p in place(away * RADIUS)]
 
 
 def light(away: float, along: Floats, place: Place) -> tuple[Scene, float]:
-    """A light in the middle of the picture, and its share of that."""
+    """A light in the middle of the picture, and the mean of the picture."""
     lamp = Sphere((0, 0, 0), RADIUS, radiance=1)
     return Scene(camera(away, along, 2), [lamp, *others(place, away)]), pi / 16
 

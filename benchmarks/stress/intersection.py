@@ -142,7 +142,7 @@ def lost_at_seams(world: World, shape: Callable[[Floats, float], Mesh]) -> Measu
 
 
 def lost_in_fine_mesh(world: World, *, at_corners: bool) -> Measure:
-    """Share of rays out of a closed mesh of so many triangles, at its corners or at random."""
+    """Share of rays that slip out of a closed mesh, aimed at its corners or at random."""
 
     def error(triangles: float, samples: int) -> float:
         rng = np.random.default_rng(0)

@@ -15,6 +15,7 @@ import drpt
 from drpt import machine
 from drpt.distribution import EXTRAS, NAME, VERSION, install_command
 from drpt.kernel import backend, llvm
+from drpt.messages import size_in_words
 from drpt.render import render
 from drpt.scene import Camera, Diffuse, Mesh, Scene, Sphere
 
@@ -162,7 +163,7 @@ def _kernels(folder: Path) -> str:
     for file in folder.glob("*.bin"):
         with suppress(FileNotFoundError):  # another process has just removed it
             sizes.append(file.stat().st_size)
-    return f"{len(sizes)} kernel{'' if len(sizes) == 1 else 's'}, {sum(sizes) / 2**20:.1f} MiB"
+    return f"{len(sizes)} kernel{'' if len(sizes) == 1 else 's'}, {size_in_words(sum(sizes))}"
 
 
 def _look_at_packages(found: Report) -> None:
@@ -191,7 +192,7 @@ def _look_at_extras(found: Report) -> None:
 
 
 def _look_at_namesake(found: Report) -> None:
-    """Look for a distribution that is named as the import: its files take the place of drpt's."""
+    """Look for a distribution with the name of the import, whose files would replace drpt's."""
     other = _version("drpt")
     if other is None:
         return
@@ -204,7 +205,7 @@ def _look_at_namesake(found: Report) -> None:
 
 
 def _requirements() -> list[str]:
-    """What drpt needs; nothing is known where its source runs without being installed."""
+    """Requirements of drpt; none if its source runs without being installed."""
     try:
         return requires(NAME) or []
     except PackageNotFoundError:

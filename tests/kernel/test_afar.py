@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 RADIUS = 2.0**-10
 # In radii; coordinates of a scene are 1e9 at the most.
 DISTANCES = (7e4, 1e7, 1e9)
-# How near to an outline a ray may be told otherwise than in float64, in radii.
+# Distance from the outline, in radii, within which float32 may decide otherwise than float64.
 OUTLINE = 1e-5
-# Of a normal: near the outline, where its square root is steep, it is off by that of `OUTLINE`.
+# Error of a normal: near the outline it is off by the square root of `OUTLINE`.
 NORMAL = 4e-3
 RAYS = 2**12
 COMPANIONS = 100
@@ -143,7 +143,7 @@ def test_a_sphere_casts_its_shadow(layout: type | None) -> None:
 
 
 def test_from_within_a_sphere_its_back_is_seen() -> None:
-    """The kernel has rays from afar for the sake of another one, 1e5 times as small."""
+    """The kernel handles distant rays because of another sphere, 1e5 times as small."""
     shapes = [drpt.Sphere((0, 0, 0), 1, material=DULL), drpt.Sphere((0, 0, 0.5), 1e-5, radiance=1)]
     camera = drpt.Camera((0.2, 0.1, 0), (0, 0, 0.5), (0, 1, 0), 90, 32, 32)
     layers = first_hits(TYPES, drpt.Scene(camera, shapes), 1, jitter=False)
@@ -163,7 +163,7 @@ def ways(camera: drpt.Camera) -> Floats:
 
 @pytest.mark.parametrize("away", [10, 1e3, 1e4, 1e8])
 def test_a_sphere_on_the_origin_is_seen_from_afar(away: float) -> None:
-    """Where the kernel's origin is on its surface, it is met otherwise by rays from near by."""
+    """A sphere whose surface has the kernel's origin uses other arithmetic for near rays."""
     center = np.array([0.0, 1.0, 0.0])
     fov = float(np.degrees(2 * np.arctan(2 / away)))
     camera = drpt.Camera((0, 1, away), center, (0, 1, 0), fov, 64, 64)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PIXELS, SAMPLES = 512, 256
 CLOSE = 0.1
-"""Relative, of an expected ratio: of the noise in so many samples."""
+"""Relative tolerance of an expected ratio, from the noise of the samples."""
 DETECTABLE = 0.01
 HALF = np.array([[0, 0, 0], [0, 0.5, 0.5]])
 """Shares: half of the directions from patches of row 1, with 1 or 2 vertices to come."""

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from tests.oracle.arrays import Floats, Ints
 
 RAYS = 2000
-# A ray is compared unless one that ends so far beside it, in units of the sheets, is to meet
-# another shape: seams may be off by 1e-6.
+# A ray is compared only if rays to points at this distance from its target, in units of the sheets,
+# should hit the same shape: seams may be off by 1e-6.
 DOUBT = 1e-4
-# The oracle meets surfaces in one plane at distances that differ by its rounding.
+# The oracle computes distances to surfaces in one plane that differ by this rounding.
 ROUNDING = 1e-9
 LAYOUTS = "polygons", "bodies", "Embree"
 
@@ -73,7 +73,7 @@ def others(rng: np.random.Generator, place: Place, layout: str) -> list[drpt.Mes
 
 
 def latest(shapes: list[drpt.Mesh], origins: Floats, directions: Floats) -> Ints:
-    """The last of the shapes that rays meet first, -1 for none."""
+    """The last of the nearest shapes along each ray, -1 for none."""
     t = np.array([geometry.closest_hit([shape], origins, directions).t for shape in shapes])
     last = len(shapes) - 1 - (t <= (1 + ROUNDING) * t.min(axis=0))[::-1].argmax(axis=0)
     return np.where(t.min(axis=0) < np.inf, last, -1)

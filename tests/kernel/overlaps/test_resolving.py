@@ -53,7 +53,7 @@ def areas(found: Primitives) -> dict[int, float]:
 
 
 def crumbs() -> drpt.Mesh:
-    """So many triangles far away that all go into a mesh."""
+    """Enough distant triangles that all triangles go into a mesh."""
     corners = np.random.default_rng(0).normal(0, 0.1, (300, 3))
     corners[:, 1] += 9
     return drpt.Mesh(corners, np.arange(300).reshape(-1, 3), material=GREY)
