@@ -1,9 +1,11 @@
 """Whether guided paths are ever noisier than those of ``mis``: ``python -m benchmarks.guided``.
 
 For each scene and number of bounces, the relMSE of ``guided`` over that of ``mis`` with as many
-samples, and the interval that covers 95 % of it, by a bootstrap over seeds. Where both pictures are
-the same there is "=". The exit status is 1 where the upper end is beyond a bound, or where the
-means of both modes differ. All of them take half an hour on two cores; each can be named.
+samples, and the interval that covers 95 % of it, by a bootstrap over seeds. Where nothing is guided
+both modes have the same kernel, and there is "=": one sample of each pixel has the same bits by
+both, and no more is rendered. The exit status is 1 where the upper end is beyond a bound, where the
+means of both modes differ, or where those bits do. All scenes take half an hour on two cores; each
+can be named.
 """
 
 from __future__ import annotations
@@ -57,8 +59,11 @@ class Ratio(NamedTuple):
     z: float
 
     def __str__(self) -> str:
-        same = self.low == self.high == 1
+        same = self == SAME
         return "=" if same else f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}] {self.z:+.1f}"
+
+
+SAME = Ratio(1, 1, 1, 0)
 
 
 def main() -> int:
@@ -87,12 +92,13 @@ def is_beyond(name: str, bounces: int, ratio: Ratio) -> bool:
 
 def measure(scene: Scene, bounces: int) -> Ratio:
     """Compare both modes, with the same seeds."""
-    guided, mis = (pictures(scene, bounces, mode, SPP, SEEDS) for mode in (Mode.GUIDED, Mode.MIS))
-    if np.array_equal(guided, mis):
-        return Ratio(1, 1, 1, 0)
-    truth = pictures(scene, bounces, Mode.MIS, REFERENCE_SPP, REFERENCES, REFERENCE_SEED).mean(
-        axis=0
-    )
+    both = [Rendering(scene, SPP, bounces, mode) for mode in (Mode.GUIDED, Mode.MIS)]
+    if not both[0].launcher.tracer.features.guiding:
+        first, second = (pictures(rendering, 1, 1) for rendering in both)
+        return SAME if np.array_equal(first, second, equal_nan=True) else Ratio(*4 * [np.nan])
+    guided, mis = (pictures(rendering, SPP, SEEDS) for rendering in both)
+    exact = Rendering(scene, REFERENCE_SPP, bounces, Mode.MIS)
+    truth = pictures(exact, REFERENCE_SPP, REFERENCES, REFERENCE_SEED).mean(axis=0)
     errors = [((x - truth) ** 2 / (truth**2 + DARK)).mean(axis=(1, 2)) for x in (guided, mis)]
     chosen = np.random.default_rng(0).integers(0, SEEDS, (RESAMPLES, SEEDS))
     resampled = [error[chosen].mean(axis=1) for error in errors]
@@ -102,11 +108,10 @@ def measure(scene: Scene, bounces: int) -> Ratio:
     return Ratio(errors[0].mean() / errors[1].mean(), low, high, z)
 
 
-def pictures(scene: Scene, bounces: int, mode: Mode, spp: int, count: int, seed: int = 1) -> Floats:
+def pictures(rendering: Rendering, spp: int, count: int, seed: int = 1) -> Floats:
     """Independent pictures, (count, pixels, 3)."""
-    launcher = Rendering(scene, spp, bounces, mode).launcher
-    pixels = range(scene.camera.width * scene.camera.height)
-    sums = launcher.launch_passes(pixels, range(spp), range(count), seed).radiance
+    pixels = range(rendering.settings.pixels)
+    sums = rendering.launcher.launch_passes(pixels, range(spp), range(count), seed).radiance
     return np.asarray(sums / spp)
 
 

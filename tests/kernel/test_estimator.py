@@ -32,7 +32,7 @@ QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 HALVES = [half for a, b, c, d in QUADS for half in ((a, b, c), (a, c, d))]
 ROOM = drpt.Mesh(CUBE, HALVES, material=DIFFUSE)
 LAMP = drpt.Sphere((0, 0, 7), 1, radiance=1)
-PANEL = drpt.Mesh(CORNERS, [[0, 1, 2]], radiance=1)
+PANEL = drpt.Mesh(np.add(CORNERS, (0, 0, 5)), [[0, 1, 2]], radiance=1)
 
 HOUSE = ROOM, TRIANGLE, LAMP
 MANY = FACET_LIMIT + 1

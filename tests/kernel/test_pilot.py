@@ -8,11 +8,12 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 import drpt
 from drpt.kernel import launch
 from drpt.kernel.launch import make_launcher
-from drpt.kernel.pilot import Pilot, best_shares, expected
+from drpt.kernel.pilot import WORTHWHILE, Pilot, best_shares, expected
 from tests.conftest import TYPES
 from tests.measuring import assert_agree, measure, with_picture
 from tests.random_scenes import tame_scene
@@ -26,6 +27,7 @@ PIXELS, SAMPLES = 512, 256
 CLOSE = 0.1
 """Relative tolerance of an expected ratio, from the noise of the samples."""
 DETECTABLE = 0.01
+PILOTS, CHANCE = 200, 1e-4
 HALF = np.array([[0, 0, 0], [0, 0.5, 0.5]])
 """Shares: half of the directions from patches of row 1, with 1 or 2 vertices to come."""
 
@@ -37,9 +39,14 @@ def pilot_of(light: Floats, ratio: Floats) -> Pilot:
     )
 
 
-def quarter() -> NDArray[np.bool_]:
+def quarter(pixels: int = PIXELS, seed: int = 0) -> NDArray[np.bool_]:
     """Whether each path goes where all light comes from, a quarter of the directions."""
-    return np.random.default_rng(0).random((PIXELS, SAMPLES)) < 0.25
+    return np.random.default_rng(seed).random((pixels, SAMPLES)) < 0.25
+
+
+def known(lit: NDArray[np.bool_]) -> Pilot:
+    """A guide leads where the light comes from, always."""
+    return pilot_of(lit.astype(float), np.where(lit, 4.0, 0))
 
 
 def test_a_guide_that_knows_where_light_comes_from_pays() -> None:
@@ -47,9 +54,8 @@ def test_a_guide_that_knows_where_light_comes_from_pays() -> None:
 
     With p = 1/4 the variance falls from p − p² to p / 2.5 − p², a fifth.
     """
-    lit = quarter()
-    pilot = pilot_of(lit.astype(float), np.where(lit, 4.0, 0))
-    assert expected(pilot, HALF, 2) == pytest.approx(0.2, rel=CLOSE)
+    pilot = known(quarter())
+    assert expected(pilot, HALF, 2).value == pytest.approx(0.2, rel=CLOSE)
     assert best_shares(pilot, HALF, 2) is not None
 
 
@@ -57,8 +63,25 @@ def test_a_guide_that_leads_elsewhere_does_not() -> None:
     """The chance of the light is halved: p / (1/2) − p², 7/3 of the variance."""
     lit = quarter()
     pilot = pilot_of(lit.astype(float), np.where(lit, 0, 4 / 3))
-    assert expected(pilot, HALF, 2) == pytest.approx(7 / 3, rel=CLOSE)
+    assert expected(pilot, HALF, 2).value == pytest.approx(7 / 3, rel=CLOSE)
     assert best_shares(pilot, HALF, 2) is None
+
+
+def test_a_gain_that_cannot_be_told_from_none_is_not_taken() -> None:
+    """From few pixels the same gain is uncertain."""
+    pilot = known(quarter(pixels=2, seed=3))
+    found = expected(pilot, HALF, 2)
+    assert found.value < WORTHWHILE < found.at_most
+    assert best_shares(pilot, HALF, 2) is None
+
+
+def test_an_estimate_is_below_the_upper_end_of_its_interval() -> None:
+    """In all but 2.5 % of pilots."""
+    found = [expected(known(quarter(pixels=128, seed=n)), HALF, 2) for n in range(PILOTS)]
+    missed = sum(one.at_most < 0.2 for one in found)
+    assert missed <= binom.isf(CHANCE, PILOTS, 0.025)
+    spread = np.std([one.value for one in found], ddof=1)
+    assert np.mean([one.error for one in found]) == pytest.approx(spread, rel=0.2)
 
 
 def test_what_cannot_be_told_is_not_guided() -> None:

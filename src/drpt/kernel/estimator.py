@@ -6,9 +6,6 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-import numpy as np
-
-from drpt.kernel.facets import area_normal
 from drpt.kernel.primitives import FACET_LIMIT, LIGHT_FACET_LIMIT
 
 if TYPE_CHECKING:
@@ -343,8 +340,7 @@ def has_small_lamp(primitives: Primitives) -> bool:
     """Whether one small sphere is the only light, so that few paths from facets hit it."""
     if not len(primitives.radiance) == primitives.sphere_lights == 1:
         return False
-    facets = sum(float(np.linalg.norm(area_normal(f.corners))) for f in primitives.facets)
-    return bool(primitives.light_areas()[0] <= SMALL_LAMP * facets)
+    return bool(primitives.light_areas()[0] <= SMALL_LAMP * primitives.facet_areas.sum())
 
 
 def _decide(reason: str, *needs: Need) -> Fact:

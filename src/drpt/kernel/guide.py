@@ -90,6 +90,7 @@ class Guide:
     def __init__(
         self, patches: Patches, light: Array, types: ModuleType, upload: Callable[[Array], Float]
     ) -> None:
+        self.patches = patches
         self._types = types
         self._facets, self._patches = len(patches.frames), len(patches.facet)
         there, area = patches.there, patches.area[patches.there]

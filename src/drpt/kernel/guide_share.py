@@ -32,7 +32,6 @@ from typing import TYPE_CHECKING, Any
 import drjit as dr
 import numpy as np
 
-from drpt.kernel.facets import area_normal
 from drpt.kernel.patches import COLUMNS
 from drpt.kernel.vec import types_of
 
@@ -76,8 +75,7 @@ def make_shares(primitives: Primitives, patches: Patches, bounces: int) -> Array
     """Shares (rows of patches, vertices to come), 0 with no vertex to come (host)."""
     facets = len(primitives.facets)
     albedo, diffuse = primitives.reflectance[:facets, :3], primitives.diffuse[:facets]
-    area = diffuse * [np.linalg.norm(area_normal(f.corners)) for f in primitives.facets]
-    mean = np.average(albedo.mean(axis=1), weights=area)
+    mean = np.average(albedo.mean(axis=1), weights=diffuse * primitives.facet_areas)
     count = min(bounces, MOST_VERTICES) - 1
     share = np.minimum(KNOWN * known_part(mean, count), known_part(albedo.max(axis=1), count))
     of_facets = np.pad(np.minimum(GREATEST, share), ((0, 1), (1, 0)))

@@ -18,7 +18,6 @@ from drpt.kernel.estimator import Features, knows_all
 from drpt.kernel.guide_share import GuideShares, make_shares, rounded
 from drpt.kernel.kept import Kept
 from drpt.kernel.learning import learn
-from drpt.kernel.patches import make_patches
 from drpt.kernel.path import Tracer
 from drpt.kernel.pilot import BOUNCES, Pilot, best_shares, fly
 from drpt.kernel.primitives import make_primitives
@@ -223,8 +222,9 @@ def guide_shares(scene: Scene, bounces: int, mode: Mode, types: ModuleType) -> G
     primitives, device_scene = prepare(scene.shapes, types)
     if not Features.of(primitives, bounces, mode).guiding:
         return None
+    patches = learned(scene.shapes, types).patches
     shares: NDArray[np.float64] | None
-    shares = rounded(make_shares(primitives, make_patches(primitives.facets), bounces))
+    shares = rounded(make_shares(primitives, patches, bounces))
     if not knows_all(primitives):
         pilot = piloted(scene.camera, scene.shapes, types, min(bounces, BOUNCES))
         shares = best_shares(pilot, shares, bounces)

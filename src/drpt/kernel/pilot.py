@@ -57,7 +57,9 @@ DARK = 0.01
 SCALES = (1.0, 0.75, 0.5, 0.25)
 """Factors of the shares among which the best is chosen."""
 WORTHWHILE = 0.9
-"""A guide is used if the expected relMSE is below this fraction of that without a guide."""
+"""A guide is used if the relMSE with it is certain to be below this fraction of that without."""
+CERTAIN = 1.96
+"""Standard errors from an estimate to the upper end of its 95 % interval."""
 
 
 class Pilot(NamedTuple):
@@ -70,6 +72,18 @@ class Pilot(NamedTuple):
     light: Array
     ratio: Array
     row: NDArray[np.uint32]
+
+
+class Expected(NamedTuple):
+    """RelMSE with a guide over that without, as a pilot estimates it, and its standard error."""
+
+    value: float
+    error: float
+
+    @property
+    def at_most(self) -> float:
+        """Upper end of the interval that covers 95 %."""
+        return self.value + CERTAIN * self.error
 
 
 @same_bits()
@@ -134,14 +148,17 @@ def _ratio(guide: Guide, start: Vertex, patch: UInt32, end: Vertex) -> Float:
 
 
 def best_shares(pilot: Pilot, shares: Array, bounces: int) -> Array | None:
-    """Shares times the scale with the least noise; None where none is worthwhile (host)."""
+    """Shares times the scale with the least noise; None where none is worthwhile (host).
+
+    Every estimate counts by the upper end of its interval: a guide that may bring nothing is none.
+    """
     scaled = [rounded(scale * shares) for scale in SCALES]
-    errors = [expected(pilot, table, bounces) for table in scaled]
+    errors = [expected(pilot, table, bounces).at_most for table in scaled]
     best = int(np.argmin(errors))
     return scaled[best] if errors[best] < WORTHWHILE else None
 
 
-def expected(pilot: Pilot, shares: Array, bounces: int) -> float:
+def expected(pilot: Pilot, shares: Array, bounces: int) -> Expected:
     """Expected relMSE with a guide over that without; infinite if it is unknown (host)."""
     light, ratio, row = pilot
     guided, weight, density = np.zeros_like(light[0]), 1.0, 1.0
@@ -155,8 +172,14 @@ def expected(pilot: Pilot, shares: Array, bounces: int) -> float:
         variance = (guided**2 * density).mean(axis=1) - _squared_mean(later)
         noise = _variance_of_runs(light[0]) + variance
         relative = 1 / (total.mean(axis=1) ** 2 + DARK)
-        found = (noise @ relative) / (_variance_of_runs(total) @ relative)
-    return float(found) if np.isfinite(found) else np.inf
+        return _ratio_of_sums(noise * relative, _variance_of_runs(total) * relative)
+
+
+def _ratio_of_sums(above: Array, below: Array) -> Expected:
+    """Of two values of each pixel; pixels are independent of each other."""
+    value = above.sum() / below.sum()
+    error = np.linalg.norm(above - value * below) / below.sum()
+    return Expected(float(value), float(error)) if np.isfinite(error) else Expected(np.inf, 0)
 
 
 def _variance_of_runs(samples: Array) -> Array:

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.facets import COPLANAR, area_vectors, bounds, make_facet, merge_coplanar
+from drpt.kernel.facets import (
+    COPLANAR,
+    area_normal,
+    area_vectors,
+    bounds,
+    make_facet,
+    merge_coplanar,
+)
 from drpt.kernel.overlaps import resolve_overlaps
 from drpt.kernel.parts import NO_TRIANGLES, NO_VECTORS, make_parts, origin_of
 from drpt.kernel.solids import make_solids
@@ -122,6 +129,13 @@ class Primitives:
     def diffuse(self) -> NDArray[np.bool_]:
         """Which of the reflecting primitives are diffuse; the others are Phong."""
         return np.asarray(self.reflectance[:, 3] == DIFFUSE)
+
+    @cached_property
+    def facet_areas(self) -> Array:
+        """Area of each facet, (n,)."""
+        areas = np.array([np.linalg.norm(area_normal(facet.corners)) for facet in self.facets])
+        areas.flags.writeable = False
+        return areas
 
     def light_areas(self) -> Array:
         """Area of each light, (n,)."""
