@@ -26,7 +26,7 @@ CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 DIFFUSE, PHONG = drpt.Diffuse(0.5), drpt.Phong(0.5, 9)
 BALL = drpt.Sphere((0, 0, 3), 1, material=DIFFUSE)
 TRIANGLE = drpt.Mesh(CORNERS, [[0, 1, 2]], material=DIFFUSE)
-SMOOTH = drpt.Mesh(CORNERS, [[0, 1, 2]], [[0, 0, 1]] * 3, material=PHONG)
+SMOOTH = drpt.Mesh(np.add(CORNERS, (0, 0, 4)), [[0, 1, 2]], [[0, 0, 1]] * 3, material=PHONG)
 CUBE = [[x, y, z] for x in (-9, 9) for y in (-9, 9) for z in (-9, 9)]
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 HALVES = [half for a, b, c, d in QUADS for half in ((a, b, c), (a, c, d))]

@@ -84,6 +84,13 @@ def test_an_estimate_is_below_the_upper_end_of_its_interval() -> None:
     assert np.mean([one.error for one in found]) == pytest.approx(spread, rel=0.2)
 
 
+@pytest.mark.parametrize("brightness", [2.0**-20, 2.0**20])
+def test_the_brightness_of_the_lamps_decides_nothing(brightness: float) -> None:
+    pilot = known(quarter())
+    brighter = pilot._replace(light=brightness * pilot.light)
+    assert expected(brighter, HALF, 2) == expected(pilot, HALF, 2)
+
+
 def test_what_cannot_be_told_is_not_guided() -> None:
     for light in (0.0, np.nan, np.inf):
         pilot = pilot_of(np.full((4, 8), light), np.ones((4, 8)))

@@ -52,8 +52,11 @@ BOUNCES = 3
 vertex."""
 SEED = 0x9E3779B9
 """Seed of the paths, whatever the seed of the render."""
-DARK = 0.01
-"""Added to squared radiance, so that dark pixels do not dominate."""
+DARK = 1 / 4
+"""Fraction of the median radiance of lit pixels; squared, it is added to squared radiance.
+
+So dark pixels do not dominate, and the brightness of the lamps has no effect.
+"""
 SCALES = (1.0, 0.75, 0.5, 0.25)
 """Factors of the shares among which the best is chosen."""
 WORTHWHILE = 0.9
@@ -171,8 +174,14 @@ def expected(pilot: Pilot, shares: Array, bounces: int) -> Expected:
         total, later = light.sum(axis=0), light[1:].sum(axis=0)
         variance = (guided**2 * density).mean(axis=1) - _squared_mean(later)
         noise = _variance_of_runs(light[0]) + variance
-        relative = 1 / (total.mean(axis=1) ** 2 + DARK)
+        relative = 1 / _weighable(total.mean(axis=1))
         return _ratio_of_sums(noise * relative, _variance_of_runs(total) * relative)
+
+
+def _weighable(radiance: Array) -> Array:
+    """Squares of the pixels' radiance, and of what is dark among them; of no light all are nan."""
+    lit = radiance[radiance > 0]
+    return np.asarray(radiance**2 + (DARK * np.median(lit) if len(lit) else np.nan) ** 2)
 
 
 def _ratio_of_sums(above: Array, below: Array) -> Expected:
