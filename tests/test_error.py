@@ -172,11 +172,16 @@ def test_errors_grow_with_the_radiance(radiance: float) -> None:
     )
 
 
-class TestBound:
+class TestEstimate:
     def of(self, squares: Floats) -> Estimate:
         """Of a grey picture with such squared differences, of independent samples."""
         levels = np.stack([squares, squares]).astype(np.float32)
         return Estimate(levels, np.ones_like(squares), 1.0, independent=True)
+
+    def of_pixel(self, squares: Floats, image: Floats) -> Estimate:
+        """Likewise, where halves of halves differ as those of independent samples do."""
+        levels = np.stack([squares, 2 * squares]).astype(np.float32)
+        return Estimate(levels, image, 1.0, independent=True)
 
     def test_many_pixels_are_certain(self) -> None:
         found = self.of(np.random.default_rng(0).chisquare(3, (SIDE, SIDE, 3)))
@@ -187,6 +192,23 @@ class TestBound:
         squares[3, 4] = 16**2
         found = self.of(squares)
         assert found.bound > 1.2 * found.relative_mse
+
+    def test_a_bright_pixel_among_dark_ones_counts_relative_to_itself(self) -> None:
+        """Of value 10 and variance 1, where its neighbours have neither light nor noise."""
+        squares = np.zeros((SIDE, SIDE, 3))
+        squares[3, 4] = 1
+        image = np.zeros_like(squares)
+        image[3, 4] = 10
+        found = self.of_pixel(squares, image)
+        assert found.relative_mse == pytest.approx(1 / (8**2 + DARK) / SIDE**2, rel=1e-6)
+
+    def test_a_firefly_does_not_hide_itself(self) -> None:
+        """A single sample is as large as its standard error."""
+        squares = np.zeros((SIDE, SIDE, 3))
+        squares[3, 4] = 1000**2
+        image = np.sqrt(squares)
+        found = self.of_pixel(squares, image)
+        assert found.relative_mse == pytest.approx(1000**2 / DARK / SIDE**2, rel=1e-6)
 
 
 class TestRelativeMse:

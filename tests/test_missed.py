@@ -47,9 +47,16 @@ def test_a_light_out_of_view_is_nowhere() -> None:
     assert not before_lights(drpt.Scene(CAMERA, [light]), project).any()
 
 
-@pytest.mark.parametrize(("value", "share"), [(0.0, 1.0), (1.5, 0.25), (3.0, 0.0), (9.0, 0.0)])
-def test_what_is_lacking_counts_relative_to_what_there_is(value: float, share: float) -> None:
-    """Emission is 3, and a picture has less of it, or more with light from elsewhere."""
+@pytest.mark.parametrize(("value", "lacking"), [(0.0, 3.0), (1.5, 1.5), (3.0, 0.0), (9.0, 0.0)])
+@pytest.mark.parametrize("elsewhere", [0.0, 2.0])
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_what_is_lacking_counts_relative_to_what_there_is(
+    value: float, lacking: float, elsewhere: float, share: float
+) -> None:
+    """Emission is 3, of which a picture has found less, or more, and light from elsewhere.
+
+    Its estimated error tells a share of it.
+    """
     asked = []
 
     def seen(pixels: range, rays: int) -> Floats:
@@ -57,11 +64,15 @@ def test_what_is_lacking_counts_relative_to_what_there_is(value: float, share: f
         return np.full((len(pixels), 3), 3.0)
 
     image = np.zeros((SIDE, SIDE, 3))
-    image[LAMP_PIXEL] = value
-    found = missed(drpt.Scene(CAMERA, [LAMP]), image, 32, project, seen)
-    assert found == pytest.approx(share * 9 / 9.01 / SIDE**2)
+    image[LAMP_PIXEL] = value + elsewhere
+    scene = drpt.Scene(CAMERA, [LAMP])
+    truth = value + elsewhere + lacking
+    expected = lacking**2 / (truth**2 + 0.01)
+    told = np.full_like(image, expected * share)
+    relative = missed(scene, image, told, 4096, project, seen, lambda _: np.full((1, 3), value))
+    assert relative == pytest.approx((1 - share) * expected / SIDE**2)
     pixel = LAMP_PIXEL[0] * SIDE + LAMP_PIXEL[1]
-    assert asked == [(range(pixel, pixel + 1), FACTOR * 32)]
+    assert asked == [(range(pixel, pixel + 1), FACTOR * 4096)]
 
 
 def test_a_render_does_not_stop_before_it_has_seen_the_lamp() -> None:

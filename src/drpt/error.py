@@ -45,6 +45,8 @@ SCATTER = 1.6
 
 The former is 2 e⁴ and 2/3 e⁴, as the estimate has three degrees of freedom, the latter 5/3 e⁴.
 """
+CERTAIN = 2
+"""Standard errors that a pixel's brightness exceeds by what is certain of it."""
 TINY = np.finfo(np.float64).tiny
 WINDOW = 5
 """Pixels along the sides of the squares in which noise is averaged, for `_weights`."""
@@ -160,7 +162,16 @@ class Estimate:
 
     @cached_property
     def _weights(self) -> Array:
-        return _weights(self.image, _average(self._levels[0], WINDOW))
+        """1 / (x² + 0.01), where x is no less than what is certain of the pixel itself.
+
+        A small light may be in one pixel alone, of which its neighbours do not tell.
+        """
+        around = _weights(self.image, _average(self._levels[0], WINDOW))
+        with np.errstate(invalid="ignore"):  # of what is not finite, the weight is not a number
+            noise = np.sqrt(self._squares(INDEPENDENT))
+            certain = np.maximum(np.abs(self.image) - CERTAIN * noise, 0)
+        weights: Array = np.minimum(around, 1 / (np.square(certain) + DARK))
+        return weights
 
     @cached_property
     def _ratio(self) -> float:
@@ -171,9 +182,12 @@ class Estimate:
 
     def _variances(self, ratios: Array | float) -> Array:
         """Variances, each unbiased but for ρ."""
+        return self._squares(ratios) * (fall(self.growth, ratios) / (ratios - 1))
+
+    def _squares(self, ratios: Array | float) -> Array:
+        """Squares of differences of halves."""
         coarse, *finer = self._levels
-        squares = combined(coarse, finer[0], ratios) if finer else coarse
-        return squares * (fall(self.growth, ratios) / (ratios - 1))
+        return combined(coarse, finer[0], ratios) if finer else coarse
 
 
 def _weights(image: Array, noise: Array) -> Array:

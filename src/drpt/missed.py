@@ -24,37 +24,55 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Seen = Callable[[range, int], Array]
+    Found = Callable[[range], Array]
     Project = Callable[[Array], Array]
 
 FACTOR = 64
 """Largest number of camera rays through a pixel, per sample of a pixel of the picture."""
 SHARE = 0.25
 """Largest number of camera rays of all pixels, per sample of the whole picture."""
+LEAST_RAYS = 2**17
+"""Least number of camera rays of all pixels together, which take about a hundredth of a second."""
 
 
-def missed(scene: Scene, image: Array, spp: int, project: Project, seen: Seen) -> float:
+def missed(
+    scene: Scene, image: Array, told: Array, spp: int, project: Project, seen: Seen, found: Found
+) -> float:
     """RelMSE that missed light adds to that of an image (height, width, 3).
 
     Parameters
     ----------
     scene, image, spp
         The scene, its picture, and the samples per pixel of the picture.
+    told
+        Estimated squared errors (height, width, 3) relative to the image; only what exceeds them
+        has been missed.
     project
         Function that projects points (n, 3) to x, y in pixels and depth, (n, 3); not a number for
         points behind the eye.
     seen
         Function that returns the directly visible emission (pixels, 3) of a range of pixels, given
         the number of camera rays per pixel.
+    found
+        Function that returns the same for the camera rays of the picture.
     """
-    pixels = image.reshape(-1, 3)
+    pixels, told = image.reshape(-1, 3), told.reshape(-1, 3)
     before = np.flatnonzero(before_lights(scene, project))
-    rays = int(max(1, min(FACTOR, SHARE * len(pixels) / max(len(before), 1))) * spp)
+    rays = _rays_for(len(before), len(pixels), spp)
     relative = 0.0
     for part in _runs(before):
-        emission = seen(part, 1 << (rays.bit_length() - 1))
-        lacking = np.maximum(emission - pixels[part.start : part.stop], 0)
-        relative += float((lacking**2 / (emission**2 + DARK)).sum())
+        lacking = np.maximum(seen(part, rays) - found(part), 0)
+        chosen = slice(part.start, part.stop)
+        squares = lacking**2 / ((pixels[chosen] + lacking) ** 2 + DARK)
+        relative += float(np.maximum(squares - told[chosen], 0).sum())
     return relative / image.size
+
+
+def _rays_for(few: int, pixels: int, spp: int) -> int:
+    """Camera rays through each of a few of all pixels, a power of two."""
+    factor = max(1, min(FACTOR, SHARE * pixels / max(few, 1)))
+    rays = max(int(factor * spp), LEAST_RAYS // max(few, 1))
+    return 1 << (rays.bit_length() - 1)
 
 
 def before_lights(scene: Scene, project: Project) -> NDArray[np.bool_]:

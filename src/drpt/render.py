@@ -168,19 +168,22 @@ class Rendering:
 
         camera = settings.scene.camera
         plane = picture_plane(camera)
+        own = max(1, self.spp // self.launcher.paths_per_ray) * lights.paths_per_ray
 
-        def emission(pixels: range, rays: int) -> NDArray[np.float64]:
+        def emission(pixels: range, samples: int, seed: int) -> NDArray[np.float64]:
             with backend.interrupts_put_off():
-                run = run_length(len(pixels), range(rays), lights.paths_per_ray)
-                sums = lights.launch(pixels, range(rays), run, settings.seed + OTHER_SEED)
-            return np.asarray(sums.radiance.sum(axis=0) / rays)
+                run = run_length(len(pixels), range(samples), lights.paths_per_ray)
+                sums = lights.launch(pixels, range(samples), run, seed)
+            return np.asarray(sums.radiance.sum(axis=0) / samples)
 
         return missed(
             settings.scene,
             result.image.astype(np.float64),
+            result.relative_squares,
             self.spp,
             lambda points: plane.project(points - np.asarray(camera.eye)),
-            emission,
+            lambda pixels, rays: emission(pixels, rays, settings.seed + OTHER_SEED),
+            lambda pixels: emission(pixels, own, settings.seed),
         )
 
     def _run(self, launcher: Launcher, samples: range) -> None:

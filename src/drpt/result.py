@@ -110,6 +110,11 @@ class Result(Immutable):
         return self._estimate.bound + self._missed
 
     @property
+    def relative_squares(self) -> NDArray[np.float64]:
+        """Estimated squared error of each value, relative to it; ``error`` is their mean."""
+        return self._estimate.relative_squares
+
+    @property
     def error_uncertain(self) -> bool:
         """Whether the true relMSE may exceed twice ``error``.
 
