@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.overlaps import Overlap, warning_of
+from drpt.kernel.overlaps import Overlap, cutting, resolve_overlaps, warning_of
+from drpt.kernel.parts import make_parts
 from drpt.kernel.primitives import Primitives, make_primitives
 from drpt.scene.builtin import builtin_names
 
@@ -73,6 +74,27 @@ def test_an_earlier_shape_that_is_covered_is_gone(extra: tuple[Shape, ...]) -> N
     assert found.overlaps == (Overlap(0, 1),)
     assert 0 not in found.shape
     assert areas(found)[1] == 36
+
+
+def test_copies_of_triangles_are_gone_without_a_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(cutting, "subtract")
+    corners = np.random.default_rng(1).normal(size=(2400, 3))
+    faces = np.arange(2400).reshape(-1, 3)
+    first, copy = (drpt.Mesh(corners, faces, material=material) for material in (GREY, WHITE))
+    found = resolve_overlaps(make_parts((first, copy), np.zeros(3)))
+    assert found.overlaps == (Overlap(0, 1),)
+    assert [len(part.primitives) for part in found.parts] == [0, 800]
+
+
+def test_a_shape_that_is_gone_covers_nothing_that_its_own_cover_does_not() -> None:
+    black = drpt.Diffuse(0)
+    small = drpt.Mesh([(-1, 0, 0), (-1, 0, 0.5), (-0.7, 0, 0.5)], [(0, 1, 2)], material=WHITE)
+    larger = sheet(1.5, material=black)
+    found = prepare(sheet(2), small, larger, LAMP)
+    assert found.overlaps == (Overlap(0, 1), Overlap(0, 2), Overlap(1, 2))
+    assert found.shape.tolist() == [0, 0, 0, 0, 2, 3]
+    assert areas(found)[0] == pytest.approx(16 - 9, rel=SEAM)
+    assert areas(found)[2] == 9
 
 
 def test_pieces_of_a_polygon_are_few() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from drpt.kernel.facets import area_vectors, has_area, merge_coplanar
 from drpt.kernel.overlaps.clipping import fan, subtract, widen
 from drpt.kernel.overlaps.coplanar import SAME_PLACE
+from drpt.kernel.overlaps.triangle_pairs import lies_inside
 from drpt.kernel.parts import NO_TRIANGLES, Part
 
 if TYPE_CHECKING:
@@ -27,28 +28,45 @@ by more, see `SAME_PLACE`."""
 
 
 def cut_parts(parts: list[Part], triangles: Triangles, pairs: Indices) -> list[Part]:
-    """Parts without the areas of the first of each pair of triangles that the second covers."""
+    """Parts without the areas of the first of each pair of triangles that the second covers.
+
+    The first ones are in ascending order.
+    """
+    gone = _wholly_covered(triangles, pairs)
+    # What is gone need not be cut, and what covers it covers all that it would have covered.
+    pairs = pairs[~np.isin(pairs, gone).any(axis=1)]
     cut: dict[int, Part] = {}
-    of_part = triangles.part[pairs[:, 0]]
-    for place, starts in zip(*np.unique(of_part, return_index=True), strict=True):
-        part, stop = triangles.parts[place], np.searchsorted(of_part, place, side="right")
-        cut[part.number] = _cut_part(triangles, part, place, pairs[starts:stop])
+    for place in np.unique(triangles.part[np.concatenate([gone, pairs[:, 0]])]):
+        ends = triangles.first[place : place + 2]
+        part = triangles.parts[place]
+        gone_here = gone[slice(*np.searchsorted(gone, ends))]
+        pairs_here = pairs[slice(*np.searchsorted(pairs[:, 0], ends))]
+        cut[part.number] = _cut_part(triangles, place, gone_here, pairs_here)
     return [cut.get(part.number, part) for part in parts]
 
 
-def _cut_part(triangles: Triangles, part: Part, place: int, pairs: Indices) -> Part:
+def _wholly_covered(triangles: Triangles, pairs: Indices) -> Indices:
+    """Numbers of the triangles that lie in a single one that covers them, ascending."""
+    corners = triangles.corners(pairs[:, ::-1].ravel()).reshape(-1, 2, 3, 3)
+    rooms = SAME_PLACE * np.abs(corners).max(axis=(1, 2, 3))
+    return np.unique(pairs[lies_inside(corners, rooms), 0])
+
+
+def _cut_part(triangles: Triangles, place: int, gone: Indices, pairs: Indices) -> Part:
+    """A part without triangles that are gone, and without what pairs cover of others."""
+    part, first = triangles.parts[place], triangles.first[place]
     covered, at = np.unique(pairs[:, 0], return_inverse=True)
-    numbers = covered - triangles.first[place]
+    numbers = covered - first
     corners, normals = part.primitives[numbers], part.normals
     if len(normals) or len(pairs) > MERGE_LIMIT:
-        covers = np.split(pairs[:, 1], np.cumsum(np.bincount(at))[:-1])
+        covers = np.split(pairs[:, 1], np.cumsum(np.bincount(at)))[: len(covered)]
         pieces = [
             _uncovered(polygon, list(triangles.corners(others)))
             for polygon, others in zip(corners, covers, strict=True)
         ]
     else:
         pieces = _merged_pieces(triangles, pairs)
-    left = np.delete(np.arange(len(part.primitives)), numbers)
+    left = np.delete(np.arange(len(part.primitives)), np.concatenate([gone - first, numbers]))
     if len(normals):
         mixed = map(_interpolated, corners, normals[numbers], pieces)
         normals = np.concatenate([normals[left], *mixed])
@@ -61,6 +79,8 @@ def _cut_part(triangles: Triangles, part: Part, place: int, pairs: Indices) -> P
 
 def _merged_pieces(triangles: Triangles, pairs: Indices) -> list[Array]:
     """Remaining triangles (m, 3, 3) of flat ones; those in one plane are cut as polygons."""
+    if not len(pairs):
+        return []
     corners, vectors = triangles.corners(pairs[:, 0]), triangles.vectors[pairs[:, 0]]
     normals = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     offsets = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.abs(corners).max()

@@ -26,6 +26,8 @@ next cell, too; with this width they are few."""
 PRIMES = np.array([73856093, 19349663, 83492791, 39916801])
 """Factors of a hash of cells (Teschner et al. 2003, "Optimized Spatial Hashing for Collision
 Detection of Deformable Objects"; one more for a fourth coordinate)."""
+COMPARED = 2**20
+"""Pairs of boxes that are compared at once, which bounds the memory to some 10 MiB."""
 FEW = 32
 """Up to this number, all pairs are compared."""
 PROGRESS = 1.5
@@ -59,7 +61,9 @@ def close_pairs(points: Array, tolerances: Array, groups: Indices, boxes: Boxes)
         small = sizes <= FEW
         found.append(_pairs_in_cells(members[small], cells[small]))
         ends = np.flatnonzero(np.diff(cells[~small])) + 1
-        for crowd in np.split(members[~small], ends) if (~small).any() else ():
+        crowds = np.split(members[~small], ends) if (~small).any() else ()
+        distinct = {np.sort(crowd).tobytes(): crowd for crowd in crowds}  # near borders all recur
+        for crowd in distinct.values():
             found.append(crowd[box_pairs(*boxes(crowd), groups[crowd])])
     pairs = np.sort(np.concatenate(found), axis=1)
     pairs = np.unique(pairs[groups[pairs[:, 0]] != groups[pairs[:, 1]]], axis=0)
@@ -152,13 +156,26 @@ def _halves(low: Array, high: Array) -> tuple[Indices, Indices] | None:
 
 
 def _all_pairs(low: Array, high: Array, groups: Indices, among: Indices) -> Indices:
-    found = [np.empty((0, 2), np.intp)]
-    for place, first in enumerate(among.tolist()):
-        others = among[place + 1 :]
-        hit = _intersect(low[first], high[first], low[others], high[others])
-        others = others[hit & (groups[others] != groups[first])]
-        found.append(np.column_stack([np.full(len(others), first), others]))
+    rows = max(1, COMPARED // len(among))
+    found = [
+        _pairs_of_rows(low, high, groups, among, range(start, min(start + rows, len(among))))
+        for start in range(0, len(among), rows)
+    ]
     return np.sort(np.concatenate(found), axis=1)
+
+
+def _pairs_of_rows(
+    low: Array, high: Array, groups: Indices, among: Indices, rows: range
+) -> Indices:
+    """Pairs of the boxes in some rows of a list, each with those after it."""
+    these, others = among[rows.start : rows.stop, None], among[None, rows.start + 1 :]
+    later = np.arange(others.size) >= np.arange(len(rows))[:, None]
+    hit = later & (groups[these] != groups[others])
+    for axis in range(low.shape[1]):
+        hit &= low[others, axis] <= high[these, axis]
+        hit &= low[these, axis] <= high[others, axis]
+    first, second = np.nonzero(hit)
+    return np.column_stack([these[first, 0], others[0, second]])
 
 
 def _intersect(low: Array, high: Array, lows: Array, highs: Array) -> NDArray[np.bool_]:

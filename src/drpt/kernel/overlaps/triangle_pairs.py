@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array: TypeAlias = NDArray[np.float64]
+    Mask: TypeAlias = NDArray[np.bool_]
 
 INSIDE = 1e-9
 """A point is in a triangle if no barycentric coordinate is below minus this. Points just outside do
@@ -25,14 +26,29 @@ def overlap_width(corners: Array) -> Array:
     return np.minimum(_reach_over_edges(corners), _reach_over_edges(corners[:, ::-1]))
 
 
+def lies_inside(corners: Array, rooms: Array) -> Mask:
+    """Whether the second of pairs of triangles (k, 2, 3, 3) in one plane lies in the first (k,).
+
+    Unless they are the same, it must keep off the first one's edges by ``rooms`` (k,).
+    """
+    first, second = corners.swapaxes(0, 1)
+    is_corner = (first[:, :, None] == second[:, None]).all(axis=3).any(axis=2)
+    heights = _heights_over_edges(corners).min(axis=(1, 2))
+    return np.asarray(is_corner.all(axis=1) | (heights >= rooms))
+
+
 def _reach_over_edges(corners: Array) -> Array:
+    return np.asarray(_heights_over_edges(corners).max(axis=2).min(axis=1))
+
+
+def _heights_over_edges(corners: Array) -> Array:
+    """Heights (k, edges, corners) of the second triangle's corners above the first one's edges."""
     first, second = corners.swapaxes(0, 1)
     ahead = np.roll(first, -1, axis=1) - first
     normals = np.cross(ahead[:, 0], ahead[:, 1])
     inward = np.cross(normals[:, None], ahead)
     inward /= np.linalg.norm(inward, axis=2, keepdims=True)
-    heights = np.einsum("kex,kecx->kec", inward, second[:, None] - first[:, :, None])
-    return np.asarray(heights.max(axis=2).min(axis=1))
+    return np.einsum("kex,kecx->kec", inward, second[:, None] - first[:, :, None])
 
 
 def separation(corners: Array, normals: Array) -> Array:
