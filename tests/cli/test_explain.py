@@ -12,6 +12,6 @@ def test_explain_prints_the_explanation(
     def explain(scene: drpt.Scene, *, bounces: int, mode: str) -> str:
         return f"{len(scene.shapes)} shapes, {bounces}, {mode}"
 
-    monkeypatch.setattr(drpt, "explain", explain)
+    monkeypatch.setattr("drpt.cli.explain.explain", explain)
     assert cli.main(["explain", "good.toml", "--bounces", "2", "--mode", "explicit"]) == 0
     assert capsys.readouterr().out == "3 shapes, 2, explicit\n"

@@ -171,7 +171,7 @@ def test_thread_count_must_be_positive() -> None:
 RENDER = """
 import drpt
 scene = drpt.load_scene("cornell-box").resized(2, 2)
-print(drpt.render(scene, spp=1, bounces=0).image.shape)
+print(drpt.render(scene, spp=1, bounces=1).image.shape)
 """
 
 

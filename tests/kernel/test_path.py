@@ -30,7 +30,7 @@ FLOOR = drpt.Mesh(
 )
 LIGHT = drpt.Sphere((0, 0, 2), 0.8, radiance=(2, 3, 4))
 BALL = drpt.Sphere((0.8, -0.8, 0.5), 0.5, material=drpt.Phong(0.8, 12))
-CHALK = drpt.Sphere((0.8, -0.8, 0.5), 0.5, material=drpt.Diffuse(0.8))
+CHALK = drpt.Sphere((-0.8, -0.8, 0.5), 0.5, material=drpt.Diffuse(0.8))
 PANEL = drpt.Mesh([[-2, -1, 0.5], [-2, 1, 0.5], [-2, 0, 2.0]], [[0, 1, 2]], radiance=(6, 5, 4))
 SMOOTH = drpt.Mesh(
     [[-1.5, -1.5, 0.2], [-0.2, -1.2, 0.2], [-1.0, -0.6, 1.0]],

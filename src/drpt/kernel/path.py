@@ -182,7 +182,7 @@ class Tracer:
         # The last segment can only hit a light; do not guide it.
         guided = brdf.is_diffuse & (depth + 1 < self.bounces)
         patch = dr.select(guided, patch, type(patch)(0))
-        share = self._share(patch, self.bounces - 1 - depth)
+        share = self._share(patch, depth + 1)
         vertex = Vertex(path, hit, brdf, patch, share)
         if features.direct_light and reflects is not False:
             light, traced = self._direct(vertex, sampler, depth)
@@ -209,7 +209,7 @@ class Tracer:
     ) -> tuple[Path, Hit]:
         """Weight both ways to choose a direction; reject guided rays that miss their target."""
         lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
-        density = self._share(path.patch, self.bounces - depth) * guide.density(path.patch, patch)
+        density = self._share(path.patch, depth) * guide.density(path.patch, patch)
         by_guide = density * dr.square(hit.distance)
         by_brdf = path.pdf * dr.abs(dr.dot(hit.normal, path.direction))
         weight = dr.select(by_guide > 0, by_brdf / (by_brdf + by_guide), 1)
@@ -260,9 +260,9 @@ class Tracer:
         aim = dr.select(guided, facet, NOWHERE)
         return Turn(direction, brdf.weight(direction) / unguided, pdf, aim)
 
-    def _share(self, patch: UInt32, vertices: Any) -> Any:
-        """The guide's share of the directions from a patch, given the number of later vertices."""
-        return self.shares.of(patch, vertices) if self.shares else 0
+    def _share(self, patch: UInt32, following: Any) -> Any:
+        """The guide's share of the directions from a patch to vertex number ``following``."""
+        return self.shares.of(patch, self.bounces - following) if self.shares else 0
 
     def _emission(self, path: Path, hit: Hit, counts: Bool | bool, *, weighted: bool) -> Array3f:
         """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
