@@ -119,7 +119,7 @@ def _regions(lights: NDArray[np.float32], noisy: Mask) -> Iterator[tuple[str, Ma
 
 
 def _ratio(squares: Array, deviations: Array) -> Ratio:
-    """Of arrays (seeds, values)."""
+    """Return the ratio of the means of two arrays (seeds, values), with its interval."""
     if not squares.size:
         return Ratio(np.nan, np.nan)
     parts = [

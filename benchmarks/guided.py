@@ -47,7 +47,7 @@ RESAMPLES = 2000
 COVERED = (0.025, 0.975)
 BOUND, BOX_BOUNDS = 1.1, {2: 0.5, 3: 0.5, 4: 0.5, 8: 0.5, 32: 0.6}
 GREATEST_Z = 4.5
-"""Of differences of means, 300 of which are looked at: by chance beyond it once in 500 tables."""
+"""Largest |z| of a difference of means: chance exceeds it in one of 500 tables of 300 cells."""
 
 
 class Ratio(NamedTuple):
@@ -116,7 +116,7 @@ def pictures(rendering: Rendering, spp: int, count: int, seed: int = 1) -> Float
 
 
 def make_scenes() -> dict[str, Callable[[], Scene]]:
-    """What is measured, by name: built-in scenes, rooms, open scenes, and random ones."""
+    """Scenes to measure, by name: built-in scenes, rooms, open scenes, and random ones."""
     scenes: dict[str, Callable[[], Scene]] = {}
     for name in (*CORNELL_BOXES, *(n for n in builtin_names() if n not in CORNELL_BOXES)):
         side = BOX_SIDE if name in CORNELL_BOXES else SIDE

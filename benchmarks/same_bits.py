@@ -39,7 +39,7 @@ for line in sys.stdin:
     facts = {"image": bits[:12], "rays": result.rays, "operations": operations}
     print(json.dumps(facts), flush=True)
 """
-"""What a checkout is asked for: by its own package, and by names that all versions have."""
+"""The script that a checkout runs with its own package; all versions have its names."""
 
 
 def main() -> int:

@@ -113,7 +113,7 @@ def main() -> int:
 def stopped(
     scene: Scene, truth: NDArray[np.float64], target: float, sampler: str, seeds: int
 ) -> tuple[dict[str, Any], int]:
-    """What the table says of a scene, and how many of the renders stopped too early."""
+    """Return the table's row of a scene, and how many of its renders stopped too early."""
     results = [
         render(scene, MOST_SPP, BOUNCES, sampler=sampler, seed=seed, target_error=target)
         for seed in range(seeds)

@@ -13,7 +13,7 @@ SCATTER = 0.08
 
 
 def squares(ratios: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of differences of runs and of their halves (height, width, 3), for ρ of pixels."""
+    """Differences of runs and of their halves (height, width, 3), for ρ of pixels."""
     rng = np.random.default_rng(0)
     coarse = scale * rng.chisquare(1, SHAPE)
     return coarse, scale * ratios * rng.chisquare(2, SHAPE) / 2

@@ -35,7 +35,7 @@ def installed_from(monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], None]:
 
 
 class TestProject:
-    """What `pyproject.toml` says."""
+    """The tables of `pyproject.toml`."""
 
     PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 

@@ -174,7 +174,7 @@ def test_errors_grow_with_the_radiance(radiance: float) -> None:
 
 class TestEstimate:
     def of(self, squares: Floats) -> Estimate:
-        """Of a grey picture with such squared differences, of independent samples."""
+        """Estimate for a grey picture with such squared differences, of independent samples."""
         levels = np.stack([squares, squares]).astype(np.float32)
         return Estimate(levels, np.ones_like(squares), 1.0, independent=True)
 
@@ -194,7 +194,7 @@ class TestEstimate:
         assert found.bound > 1.2 * found.relative_mse
 
     def test_a_bright_pixel_among_dark_ones_counts_relative_to_itself(self) -> None:
-        """Of value 10 and variance 1, where its neighbours have neither light nor noise."""
+        """Differences for a pixel of value 10 and variance 1 whose neighbours are black."""
         squares = np.zeros((SIDE, SIDE, 3))
         squares[3, 4] = 1
         image = np.zeros_like(squares)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 INPUTS = 60
-"""Of each target: a second or two, start included."""
+"""Inputs of each target: a second or two, start included."""
 PAST_PARSER = 0.3
 """Share of the inputs that the parser of the format must let through."""
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from drpt import Mesh
 
 COUNTS = (0, 1, 3, 2**31, 4 * 10**9, 2**63, -1)
-"""What a header may tell."""
+"""Counts that a header may give."""
 TYPES = ("float", "double", "int", "uchar", "short", "float32", "half", "x")
 ROUNDING = 1e-6
 """Relative error of areas of small polygons, whose vertices are float32 in Mitsuba."""

@@ -55,7 +55,7 @@ TEXTS = (
     '"""\n"""',
     "1e999",
 )
-"""What a value may be in a text that a tree cannot hold."""
+"""Values that a scene file may hold and a parsed table cannot."""
 
 
 def make(random: Random) -> bytes:

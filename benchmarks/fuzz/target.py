@@ -1,4 +1,4 @@
-"""What a fuzzer is given: how to make inputs, what to call, and what the call may raise."""
+"""A fuzzing target: how to make inputs, what to call, and what the call may raise."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ MEMORY = 2**30
 
 
 class Outcome(NamedTuple):
-    """What came of an input.
+    """The outcome of one input.
 
     Attributes
     ----------

@@ -97,7 +97,7 @@ def estimate(
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What the samples of an image tell about its error.
+    """Error of an image, estimated from its samples.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def test_a_render_agrees_with_drpts_next(tmp_path: Path, sampler: str) -> None:
 
 
 def test_a_render_of_a_brighter_light_differs(tmp_path: Path) -> None:
-    """By 5 %: the test of the means detects 2 %."""
+    """A picture that is 5 % too bright; the test of the means detects 2 %."""
     render(with_radiance(lit(), 1.05), 1024, 1, seed=1).save(tmp_path / "a.exr")
     report = check(stored_reference(lit(), tmp_path / "a.exr"), spp=1024)
     assert report.verdict == "differs"

@@ -1,4 +1,4 @@
-"""What is opened: regular files, and no more of them than is allowed."""
+"""Opening regular files, and reading no more of them than is allowed."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def test_vectors_of_another_width() -> None:
 
 
 def bits_of_all(*, fast: bool) -> list[bytes]:
-    """What each way to run kernels finds, with a setting of the caller's."""
+    """Results of each way to run kernels, with a setting of the caller's."""
     forget()
     scene = seen_by(drpt.load_scene("cornell-box-glossy"), 8, 8)
     with dr.scoped_set_flag(dr.JitFlag.FastMath, fast):

@@ -1,4 +1,4 @@
-"""What a guide is expected to bring."""
+"""Whether a guide is expected to reduce the noise."""
 
 from __future__ import annotations
 

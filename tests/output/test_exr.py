@@ -140,7 +140,7 @@ FLAT = np.full((6, 7), 2, np.float32)
 
 
 def refusal(path: Path, capfd: pytest.CaptureFixture[str]) -> str:
-    """What a file is refused with; nothing else is printed, as OpenEXR does by itself."""
+    """Return the refusal of a file; nothing else may be printed, as OpenEXR does by itself."""
     with pytest.raises((ValueError, OSError)) as error:
         read_exr_layers(path)
     assert str(error.value).startswith(f"{path}: ")

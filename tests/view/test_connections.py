@@ -36,7 +36,7 @@ def frame(opcode: int, payload: bytes, *, final: bool = True, masked: bool = Tru
 
 
 def rest(plain: socket.socket) -> bytes:
-    """What the server says until it ends the connection."""
+    """Return what the server sends until it ends the connection."""
     said = b""
     try:
         while data := plain.recv(2**16):

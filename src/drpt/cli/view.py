@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from drpt.view.worker import Worker
 
 PACKAGES = EXTRAS["view"]
-"""What the extra installs, which are also the names of their imports."""
+"""Packages that the extra installs; their imports have the same names."""
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
 """Variables of which one is set where a Linux has a browser to open."""
 

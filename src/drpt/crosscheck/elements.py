@@ -99,7 +99,7 @@ class Element:
 
     @cached_property
     def children(self) -> dict[str, Any]:
-        """What it holds by name: elements, and Mitsuba's objects where a dict has them."""
+        """Children by name: elements, and Mitsuba's objects where a dict has them."""
         props, types = self.node.props, self.mi.Properties.Type
         nodes = self.state.nodes
         return {

@@ -185,7 +185,7 @@ def _weighable(radiance: Array) -> Array:
 
 
 def _ratio_of_sums(above: Array, below: Array) -> Expected:
-    """Of two values of each pixel; pixels are independent of each other."""
+    """Ratio of two sums over the pixels, with its standard error; pixels are independent."""
     value = above.sum() / below.sum()
     error = np.linalg.norm(above - value * below) / below.sum()
     return Expected(float(value), float(error)) if np.isfinite(error) else Expected(np.inf, 0)

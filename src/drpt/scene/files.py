@@ -47,7 +47,7 @@ def load_scene(name_or_path: str | PathLike[str]) -> Scene:
 
 
 class SceneFile(NamedTuple):
-    """What a scene file holds.
+    """The content of a scene file.
 
     Attributes
     ----------

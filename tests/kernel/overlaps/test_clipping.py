@@ -1,4 +1,4 @@
-"""What convex polygons leave of each other: areas, borders, and widened edges."""
+"""Differences of convex polygons: areas, borders, and widened edges."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_pieces_reach_under_the_border_of_what_covers_but_not_between_its_parts(
 
 @pytest.mark.parametrize("seed", range(8))
 def test_areas_of_pieces_sum_up(seed: int) -> None:
-    """By counting points: those of the polygon in none of the others are in one piece each."""
+    """Random points of the polygon outside of the others lie in exactly one piece each."""
     rng = np.random.default_rng(seed)
     axes = np.linalg.qr(rng.standard_normal((3, 3)))[0]
 
