@@ -137,7 +137,8 @@ def test_stopping_does_not_bias_the_picture(sampler: str) -> None:
     scene = seen_by(LAMP_AND_BALL, 12, 8)
     truth = drpt.render(scene, 2**16, 1, seed=2**40).image.astype(np.float64)
     settings: Any = {"bounces": 1, "mode": "implicit", "sampler": sampler}
-    middle = np.median([drpt.render(scene, 64, seed=seed, **settings).error for seed in range(20)])
+    first = [drpt.render(scene, 64, seed=seed, **settings) for seed in range(20)]
+    middle = np.median([result.error_bound for result in first])
     stopped = [
         drpt.render(scene, 1024, seed=seed, target_error=float(middle), **settings)
         for seed in range(SEEDS)
