@@ -219,11 +219,14 @@ class Page {
   }
 
   #writeUrl() {
+    if (location.hash !== this.readHash) return; // the user changed it, and it is read next
     const hash = `#${write(this.view.state, this.view.look, this.base)}`;
     if (hash !== location.hash) history.replaceState(null, "", hash);
+    this.readHash = location.hash;
   }
 
   #readUrl() {
+    this.readHash = location.hash;
     const { state, look, ignored } = read(location.hash, this.base);
     this.#say(ignored.length ? `The link holds what means nothing: ${ignored.join(", ")}` : "", 1);
     this.view.replace(state, look);
