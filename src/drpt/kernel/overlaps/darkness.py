@@ -49,7 +49,7 @@ def dark_on_both_sides(parts: list[Part], triangles: Triangles, pairs: Indices) 
 
 
 def _planes(triangles: Triangles, pairs: Indices) -> Array:
-    """Row (normal, offset) of the plane of each pair: that of the larger triangle."""
+    """Return the plane of each pair, a row (normal, offset): the larger triangle's plane."""
     numbers, normals = triangles.larger(pairs)
     offsets = np.einsum("kx,kx->k", normals, triangles.corners(numbers)[:, 0])
     return np.column_stack([normals, offsets])
