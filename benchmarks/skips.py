@@ -23,6 +23,7 @@ from benchmarks.bench.scenes import ball_pit, resized
 from drpt import Mesh, Phong, Result, Scene, load_scene, render
 from drpt.kernel import backend
 from drpt.kernel.estimator import Features, Mode
+from drpt.scene.materials import MATERIALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -133,23 +134,40 @@ def features(**flags: bool) -> Callable[[], list[AbstractContextManager[Any]]]:
     ]
 
 
-def choosing(**flags: bool) -> Callable[[], list[AbstractContextManager[Any]]]:
-    """A choice between the light and itself; features as told, too."""
+def all_materials() -> list[AbstractContextManager[Any]]:
+    """All kinds of materials, whatever the scene has."""
+    return [patch("drpt.kernel.primitives.Primitives.kinds", MATERIALS)]
+
+
+def choosing(*, both_kinds: bool = False) -> Callable[[], list[AbstractContextManager[Any]]]:
+    """A choice between the light and itself, perhaps with code for lights of both kinds."""
 
     def upload_two(primitives: Primitives, types: ModuleType) -> DeviceScene:
         scene = _upload_something(primitives, types)
-        return replace(scene, light_count=2, light_tree=_same_light_twice(primitives, types))
+        tree = _same_light_twice(primitives, types)
+        kinds: tuple[Any, ...] = scene.emitters.kinds
+        if both_kinds:
+            kinds = _both_kinds(kinds[0], types)
+        kinds = tuple(replace(kind, count=2 * kind.count) for kind in kinds)
+        return replace(scene, emitters=replace(scene.emitters, kinds=kinds, tree=tree))
 
-    return lambda: [
-        *features(light_choice=True, **flags)(),
-        patch("drpt.kernel.launch.upload", upload_two),
-    ]
+    return lambda: [patch("drpt.kernel.launch.upload", upload_two)]
+
+
+def _both_kinds(kind: Any, types: ModuleType) -> tuple[Any, ...]:
+    """A single light, and the kind that it does not have, without any light."""
+    from drpt.kernel.emitters import SphereLights, TriangleLights
+
+    if isinstance(kind, TriangleLights):
+        return SphereLights(kind.rows, 0), kind
+    corners = types.Float32(np.ones(9, np.float32))
+    return kind, TriangleLights(kind.rows, kind.count, 0, corners)
 
 
 def _same_light_twice(primitives: Primitives, types: ModuleType) -> Any:
     import drjit as dr
 
-    from drpt.kernel.light_tree import Choice, LightTree
+    from drpt.kernel.emitters.light_tree import Choice, LightTree
 
     class SameLight(LightTree):
         def choose(self, *arguments: Any) -> Choice:
@@ -167,12 +185,10 @@ def _upload_something(primitives: Primitives, types: ModuleType) -> DeviceScene:
     from drpt.kernel.device_scene import upload
 
     scene = upload(primitives, types)
-    tables: dict[str, Any] = {
-        name: types.Float32(np.ones(size, np.float32))
-        for name, size in (("smooth", 18), ("light_corners", 9))
-        if not len(getattr(scene, name))
-    }
-    return replace(scene, **tables)
+    if len(scene.geometry.smooth):
+        return scene
+    smooth = types.Float32(np.ones(18, np.float32))
+    return replace(scene, geometry=replace(scene.geometry, smooth=smooth))
 
 
 def _light_code() -> list[AbstractContextManager[Any]]:
@@ -182,8 +198,7 @@ def _light_code() -> list[AbstractContextManager[Any]]:
     def first_vertex(self: Tracer, ray: Any, sampler: Any, known: Any = None) -> Vertex:
         return self.arrive(self.start(ray), sampler, _opaque(self.scene.types.UInt32, 0), known)
 
-    flags = {"diffuse": True, "direct_light": True, "sphere_light_samples": True}
-    return [*features(**flags)(), patch.object(Tracer, "first_vertex", first_vertex)]
+    return [*features(direct_light=True)(), patch.object(Tracer, "first_vertex", first_vertex)]
 
 
 def _last_ray() -> list[AbstractContextManager[Any]]:
@@ -199,7 +214,7 @@ def _last_ray() -> list[AbstractContextManager[Any]]:
         for depth in range(1, self.bounces):
             path = self.step(path, sampler, depth)
         ray = Ray(path.origin, path.direction)
-        hit = light_hit(self.scene, self.features, ray, path.active)
+        hit = light_hit(self.scene.geometry, self.features, ray, path.active)
         nothing = dr.select(hit.valid, _opaque(self.scene.types.Float32, 0), 0)
         return path.radiance + nothing, path.rays
 
@@ -213,11 +228,11 @@ def _last_ray() -> list[AbstractContextManager[Any]]:
 def _weights() -> list[AbstractContextManager[Any]]:
     """Weights of two techniques, of which only the device knows that one never finds light."""
     from drpt.kernel import path
-    from drpt.kernel.brdf import Brdf
+    from drpt.kernel.bsdfs import Bsdf
 
-    pdf, emission = Brdf.pdf, path.Tracer._emission
+    pdf, emission = Bsdf.pdf, path.Tracer._emission
 
-    def no_pdf(self: Brdf, to_light: Any) -> Any:
+    def no_pdf(self: Bsdf, to_light: Any) -> Any:
         return pdf(self, to_light) * _opaque(type(to_light.x), 0)
 
     def weighted(self: Tracer, *args: Any, weighted: bool) -> Any:
@@ -226,7 +241,7 @@ def _weights() -> list[AbstractContextManager[Any]]:
 
     return [
         *features(mis=True)(),
-        patch.object(Brdf, "pdf", no_pdf),
+        patch.object(Bsdf, "pdf", no_pdf),
         patch.object(path.Tracer, "_emission", weighted),
     ]
 
@@ -321,8 +336,8 @@ def _glossy(shape: Shape) -> Shape:
 
 _MIS, _EXPLICIT = Mode.MIS, Mode.EXPLICIT
 SKIPS = (
-    Skip("Phong code", cornell_box, 2, _EXPLICIT, features(phong=True)),
-    Skip("diffuse code", phong_box, 2, _MIS, features(diffuse=True)),
+    Skip("Phong code", cornell_box, 2, _EXPLICIT, all_materials),
+    Skip("diffuse code", phong_box, 2, _MIS, all_materials),
     Skip("interpolated normals", cornell_box, 2, _EXPLICIT, features(interpolated_normals=True)),
     Skip("points on spheres", panel_box, 2, _EXPLICIT, features(spheres=True)),
     Skip("points on reflecting spheres", cornell_box, 2, _EXPLICIT, _normals_of_lights),
@@ -333,14 +348,14 @@ SKIPS = (
         cornell_box,
         2,
         _EXPLICIT,
-        choosing(triangle_light_samples=True),
+        choosing(both_kinds=True),
     ),
     Skip(
         "choice, and samples of sphere lights",
         panel_box,
         2,
         _EXPLICIT,
-        choosing(sphere_light_samples=True),
+        choosing(both_kinds=True),
     ),
     Skip("light code at bounces 0", cornell_box, 0, _EXPLICIT, _light_code),
     Skip("last ray", cornell_box, 2, _EXPLICIT, _last_ray),

@@ -24,7 +24,7 @@ from drpt.render import SAMPLERS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from drpt.scene.model import Material, Shape
+    from drpt.scene import Material, Shape
 
 SIDE, FOV, DISTANCE = 16, 20, 10
 PIXEL = 2 * np.tan(np.radians(FOV / 2)) / SIDE * DISTANCE

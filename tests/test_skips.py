@@ -22,6 +22,7 @@ from benchmarks.skips import (
     Run,
     Skip,
     all_block,
+    all_materials,
     features,
     many_spheres,
     run,
@@ -84,10 +85,10 @@ def assert_same(skip: Skip, scene: drpt.Scene) -> tuple[Run, Run]:
 
 def with_everything(mode: drpt.Mode) -> Skip:
     """Code for all kinds of surfaces, and shadows of all facets."""
-    kinds = ("spheres", "triangles", "interpolated_normals", "diffuse", "phong")
+    shapes = ("spheres", "triangles", "interpolated_normals")
 
     def undo() -> list[AbstractContextManager[Any]]:
-        return [*features(**dict.fromkeys(kinds, True))(), *all_block()]
+        return [*features(**dict.fromkeys(shapes, True))(), *all_materials(), *all_block()]
 
     return Skip("all kinds", many_spheres, 3, mode, undo)
 
@@ -107,7 +108,7 @@ def test_random_scenes_need_no_more(seed: int) -> None:
 
 def test_code_for_what_a_scene_has_is_missed() -> None:
     """The comparison sees a skip that is none."""
-    skip = Skip("spheres", spheres, 1, drpt.Mode.EXPLICIT, features(diffuse=False))
+    skip = Skip("spheres", spheres, 1, drpt.Mode.EXPLICIT, features(direct_light=False))
     with pytest.raises(AssertionError):
         assert_same(skip, resized(spheres(), SIDE))
 

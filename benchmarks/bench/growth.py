@@ -54,7 +54,8 @@ def uniform_choice() -> Iterator[None]:
     The kernels stay the same, and so does their time; what changes is the even share of each
     choice. Raises `RuntimeError` where nothing has chosen by it.
     """
-    from drpt.kernel import device_scene, light_tree
+    from drpt.kernel import device_scene
+    from drpt.kernel.emitters import light_tree
     from drpt.kernel.launch import forget
 
     kept = light_tree.LightTree

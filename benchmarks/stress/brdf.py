@@ -11,9 +11,7 @@ from benchmarks.stress.harness import Case
 from benchmarks.stress.lights import relative, sobol
 from benchmarks.stress.pictures import camera_at, mean_in_drpt, mean_in_mitsuba
 from drpt import Mesh, Mode, Phong, Scene, Sphere
-from drpt.kernel.brdf import Brdf
-from drpt.kernel.estimator import Features
-from drpt.kernel.primitives import make_primitives
+from drpt.kernel.bsdfs import Bsdf, PhongLobe, SurfacePoint
 from tests.conftest import to_device, to_host
 from tests.oracle.closed_forms import phong_directional_albedo, phong_mirrored_light
 
@@ -59,15 +57,12 @@ def _in_mode(mode: Mode) -> Callable[[Scene, int], float]:
     return lambda scene, samples: mean_in_drpt(scene, samples, mode=mode)
 
 
-def _brdf(exponent: float, theta: float) -> Brdf:
+def _bsdf(exponent: float, theta: float) -> Bsdf:
     """One point with the normal +z, seen at the angle θ from it."""
-    material = Phong(ALBEDO, exponent)
-    shapes = [Sphere((0, 0, 0), 1, material=material), Sphere((0, 0, 5), 1, radiance=1)]
-    primitives = make_primitives(Scene(camera_at((0, 0, 9), (0, 0, 0)), shapes).shapes)
-    features = Features.of(primitives, 1, Mode.MIS)
     normal, view = to_device([[0, 0, 1]]), to_device([[sin(theta), 0, cos(theta)]])
-    albedo, exponents = to_device([material.albedo]), to_device([exponent])
-    return Brdf(features, albedo, exponents, normal, normal, view)
+    albedo, code = to_device([[ALBEDO] * 3]), to_device([exponent])
+    point = SurfacePoint(code, normal, view)
+    return Bsdf((PhongLobe(),), albedo, code, point, None)
 
 
 def of_albedo(exponent: float) -> Measure:
@@ -75,7 +70,7 @@ def of_albedo(exponent: float) -> Measure:
 
     def error(height: float, samples: int) -> float:
         theta = radians(90 - height)
-        weight = _brdf(exponent, theta).sample(sobol(samples)).weight
+        weight = _bsdf(exponent, theta).sample(sobol(samples)).weight
         expected = phong_directional_albedo(ALBEDO, exponent, theta)
         return relative(float(to_host(weight.x).mean()), expected)
 
@@ -94,7 +89,7 @@ def of_integral(exponent: float) -> Measure:
         axis = np.array([-sin(theta), 0, cos(theta)])
         side, across = np.array([cos(theta), 0, sin(theta)]), np.array([0, 1, 0])
         local = np.outer(sine * np.cos(phi), side) + np.outer(sine * np.sin(phi), across)
-        value = to_host(_brdf(exponent, theta).eval(to_device(local + np.outer(cosine, axis))).x)
+        value = to_host(_bsdf(exponent, theta).eval(to_device(local + np.outer(cosine, axis))).x)
         expected = phong_directional_albedo(ALBEDO, exponent, theta)
         return relative(float((value / density).mean()), expected)
 

@@ -10,12 +10,10 @@ import numpy as np
 
 from benchmarks.stress.harness import Case
 from benchmarks.stress.pictures import camera_at, mean_in_drpt, mean_in_mitsuba
-from drpt import Diffuse, Mesh, Mode, Scene, Sphere
+from drpt import Diffuse, Mesh, Scene, Sphere
 from drpt.crosscheck.variant import load_mitsuba
 from drpt.kernel.device_scene import upload
-from drpt.kernel.estimator import Features
-from drpt.kernel.light import Receiver, sample_light
-from drpt.kernel.light_tree import Choice
+from drpt.kernel.emitters import Choice, Receiver
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SobolSampler
 from tests.conftest import TYPES, to_device, to_host
@@ -58,10 +56,9 @@ def in_drpt(light: Sphere, normal: Floats, samples: int) -> float:
     """Irradiance at the origin, by samples of the light alone."""
     primitives = make_primitives(Scene(camera_at((0, 0, 5), ORIGIN), [FLOOR, light]).shapes)
     scene = upload(primitives, TYPES)
-    features = Features.of(primitives, 1, Mode.EXPLICIT)
     at = Receiver(to_device([ORIGIN - primitives.origin]), to_device([normal]))
     choice = Choice(TYPES.UInt32([0]), TYPES.Float32(1))
-    sample = sample_light(scene, features, Mode.EXPLICIT, at, choice, sobol(samples))
+    sample = scene.emitters.sample(at, choice, sobol(samples), visible=True)
     cosine = np.maximum(to_host(sample.direction) @ normal, 0)
     return float((to_host(sample.inverse_pdf) * cosine).mean())
 

@@ -12,7 +12,7 @@ from drpt.crosscheck.variant import load_mitsuba
 
 if TYPE_CHECKING:
     from drpt import Scene
-    from drpt.scene.model import Vector
+    from drpt.scene.checks import Vector
 
 SIDE = 16
 """Pixels of a picture; their samples are one mean."""

@@ -45,7 +45,7 @@ class Drpt:
     def __init__(self, *shapes: Shape) -> None:
         scene = Scene(camera_at((0, 0, 9), (0, 0, 0)), shapes)
         launcher = make_launcher(TYPES, scene, 1, Mode.MIS, "independent", jitter=False)
-        self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
+        self.scene, self.features = launcher.tracer.scene.geometry, launcher.tracer.features
         if make_primitives(scene.shapes).origin.any():
             raise ValueError("shapes: they are so far aside that the kernel's origin moves along")
 

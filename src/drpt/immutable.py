@@ -63,3 +63,9 @@ def _is_immutable(array: object) -> bool:
     while isinstance(array, np.ndarray):
         array = array.base
     return isinstance(array, _Memory)
+
+
+def set_fields(instance: object, **values: object) -> None:
+    """Fill the fields of a frozen dataclass while it is made."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)

@@ -16,8 +16,7 @@ from drpt import Diffuse, Mesh, Mode, Phong, Scene, Sphere, load_scene
 from drpt.crosscheck import Estimate, measure
 from drpt.crosscheck.references import SPP
 from drpt.kernel import intersect, path
-from drpt.kernel.brdf import Brdf
-from drpt.kernel.primitives import DIFFUSE
+from drpt.kernel.bsdfs import Bsdf
 from drpt.kernel.warp import INV_PI
 from tests.measuring import with_picture
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
-    from drpt.scene import Shape
+    from drpt.scene import Material, Shape
     from tests.oracle.arrays import Floats
 
 GLOSSY = "cornell-box-glossy"
@@ -146,7 +145,7 @@ def moved_light(shape: Shape, size: float) -> Shape:
     return Sphere(center, shape.radius, radiance=shape.radiance)
 
 
-def with_material(shape: Shape, material: Diffuse | Phong) -> Shape:
+def with_material(shape: Shape, material: Material) -> Shape:
     if isinstance(shape, Sphere):
         return Sphere(shape.center, shape.radius, material)
     return Mesh(shape.vertices, shape.faces, shape.normals, material)
@@ -170,33 +169,33 @@ def counted_twice(scene: Scene, size: float, mode: Mode) -> Estimate:
 def no_cosine(size: float) -> AbstractContextManager[Any]:
     """Light samples of diffuse surfaces, from the cosine to 1 in its place."""
 
-    def evaluate(self: Brdf, to_light: Any) -> Any:
-        cosine = dr.dot(self.shading_normal, to_light)
+    def evaluate(self: Bsdf, to_light: Any) -> Any:
+        cosine = dr.dot(self.point.shading_normal, to_light)
         share = dr.opaque(type(cosine), size)
         return self.albedo * dr.select(cosine > 0, INV_PI * dr.lerp(cosine, 1, share), 0)
 
-    return patch.object(Brdf, "eval", evaluate)
+    return patch.object(Bsdf, "eval", evaluate)
 
 
 @contextmanager
 def renormalised(size: float) -> Iterator[None]:
     """A lobe divided by its part above the horizon, which is nearly that of a Gaussian."""
 
-    def factor(brdf: Brdf) -> Any:
-        cosine = dr.dot(brdf.shading_normal, brdf.to_viewer)
-        above = (1 + dr.erf(cosine * dr.sqrt((brdf.exponent + 1) / 2))) / 2
-        is_lobe = brdf.exponent != DIFFUSE
+    def factor(bsdf: Bsdf) -> Any:
+        cosine = dr.dot(bsdf.point.shading_normal, bsdf.point.to_viewer)
+        above = (1 + dr.erf(cosine * dr.sqrt((bsdf.code + 1) / 2))) / 2
+        is_lobe = ~Diffuse.has(bsdf.code)
         return dr.select(is_lobe, dr.lerp(1, 1 / above, dr.opaque(type(cosine), size)), 1)
 
-    def evaluate(self: Brdf, to_light: Any) -> Any:
+    def evaluate(self: Bsdf, to_light: Any) -> Any:
         return original_eval(self, to_light) * factor(self)
 
-    def sample(self: Brdf, u: Any) -> Any:
+    def sample(self: Bsdf, u: Any) -> Any:
         sample = original_sample(self, u)
         return sample._replace(weight=sample.weight * factor(self))
 
-    original_eval, original_sample = Brdf.eval, Brdf.sample
-    with patch.object(Brdf, "eval", evaluate), patch.object(Brdf, "sample", sample):
+    original_eval, original_sample = Bsdf.eval, Bsdf.sample
+    with patch.object(Bsdf, "eval", evaluate), patch.object(Bsdf, "sample", sample):
         yield
 
 

@@ -57,9 +57,9 @@ class World:
             TYPES, drpt.Scene(camera, shapes), 1, Mode.MIS, "independent", jitter=False
         )
         assert not launcher.primitives.origin.any()
-        assert isinstance(launcher.tracer.scene.many_spheres, layout or type(None))
-        self.far, self.number = far, launcher.tracer.scene.first_sphere
-        self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
+        assert isinstance(launcher.tracer.scene.geometry.many_spheres, layout or type(None))
+        self.far, self.number = far, launcher.tracer.scene.geometry.first_sphere
+        self.scene, self.features = launcher.tracer.scene.geometry, launcher.tracer.features
 
 
 # A rotation that leaves no coordinate of a ray 0.
@@ -177,4 +177,4 @@ def launcher_of(name: str) -> Launcher:
 
 
 def test_kernels_of_plain_scenes_have_nothing_of_it() -> None:
-    assert not any(launcher_of(name).tracer.scene.afar for name in builtin_names())
+    assert not any(launcher_of(name).tracer.scene.geometry.afar for name in builtin_names())

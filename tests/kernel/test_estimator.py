@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,8 +65,8 @@ COURSE_NAMES = {
 def features(*shapes: Shape, bounces: int = 2, mode: str = "mis") -> set[str]:
     """Names of the features that the kernel of a scene has."""
     primitives = make_primitives(drpt.Scene(camera=CAMERA, shapes=shapes).shapes)
-    found = asdict(Features.of(primitives, bounces, Mode(mode)))
-    return {name for name, on in found.items() if on}
+    found = feature_facts(primitives, bounces, Mode(mode))
+    return {name for name, fact in found.items() if fact.holds}
 
 
 def facts(
@@ -122,7 +121,9 @@ def test_what_modes_do(
 
 
 def test_a_scene_of_everything_has_all_features() -> None:
-    everything = set(Features.__dataclass_fields__) - {"shared_rays", "regeneration"}
+    primitives = make_primitives((BALL, LAMP))
+    names = feature_facts(primitives, 2, Mode.MIS).keys()
+    everything = names - {"shared_rays", "regeneration"}
     assert features(BALL, TRIANGLE, SMOOTH, LAMP, PANEL, mode="guided") == everything
 
 
@@ -298,7 +299,7 @@ def test_reasons(
 )
 def test_what_is_told_is_on_the_device(shapes: list[Shape]) -> None:
     told = {name: fact.holds for name, fact in facts(*shapes).items()}
-    _, scene = prepare(tuple(shapes), TYPES)
+    scene = prepare(tuple(shapes), TYPES)[1].geometry
     assert told["mesh"] is (scene.mesh is not None or scene.light_mesh is not None)
     assert told["sphere_grid"] is isinstance(scene.many_spheres, SphereGrid)
     assert told["sphere_tree"] is isinstance(scene.many_spheres, SphereTree)

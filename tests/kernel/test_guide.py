@@ -173,7 +173,7 @@ def hit_at(points: Floats, primitive: int) -> Hit:
     p = to_device(points)
     number = dr.full(TYPES.UInt32, primitive, len(points))
     yes = dr.full(TYPES.Bool, True, len(points))
-    return Hit(yes, p.x, number, p, p, p, yes, p, p.x)
+    return Hit(yes, p.x, number, p, p, p, yes, TYPES.Array4f(0))
 
 
 def test_a_hit_far_outside_its_facet_is_in_no_patch(guide: Guide) -> None:

@@ -68,7 +68,7 @@ class World:
         self.shapes = shapes
         scene = drpt.Scene(camera=CAMERA, shapes=shapes)
         launcher = make_launcher(TYPES, scene, 1, Mode.MIS, "independent", jitter=False)
-        self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
+        self.scene, self.features = launcher.tracer.scene.geometry, launcher.tracer.features
         self.primitives = make_primitives(scene.shapes)
 
     def closest(self, origins: Floats, directions: Floats) -> Found:

@@ -45,7 +45,7 @@ SHAPES: dict[str, tuple[Shape, ...]] = {
 def test_it_is_the_closest_hit_where_that_is_a_light(name: str) -> None:
     scene = drpt.Scene(camera=CAMERA, shapes=SHAPES[name])
     tracer = make_launcher(TYPES, scene, 1, drpt.Mode.MIS, "independent", jitter=False).tracer
-    device, types = tracer.scene, tracer.scene.types
+    device, types = tracer.scene.geometry, tracer.scene.types
     rng = np.random.default_rng(0)
     points = np.concatenate([_extent(shape) for shape in scene.shapes])
     origins = np.einsum(
@@ -82,7 +82,7 @@ def test_nothing_is_met_by_rays_that_are_not_there() -> None:
     tracer = make_launcher(TYPES, scene, 1, drpt.Mode.MIS, "independent", jitter=False).tracer
     ray = Ray(to_device(np.zeros((4, 3))), to_device(np.array([[0, 0, 1.0]] * 4)))
     there = TYPES.Bool([True, False, True, False])
-    hit = light_hit(tracer.scene, tracer.features, ray, there)
+    hit = light_hit(tracer.scene.geometry, tracer.features, ray, there)
     assert np.array(hit.valid).tolist() == [True, False, True, False]
 
 

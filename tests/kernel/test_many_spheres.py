@@ -54,7 +54,7 @@ class Balls:
         ]
         scene = drpt.Scene(drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 40, 8, 8), shapes)
         launcher = make_launcher(TYPES, scene, 1, Mode.MIS, "independent", jitter=False)
-        self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
+        self.scene, self.features = launcher.tracer.scene.geometry, launcher.tracer.features
         self.hierarchy = type(self.scene.many_spheres)
 
     def closest(self, origins: Floats, directions: Floats) -> tuple[Ints, Floats]:
@@ -141,7 +141,7 @@ def test_from_afar_nothing_is_lost_where_cells_meet() -> None:
     centers = np.array(np.meshgrid(k, k, [0.0])).reshape(3, -1).T
     shapes = [drpt.Sphere(tuple(center), 0.3, radiance=1) for center in centers.tolist()]
     camera = drpt.Camera((0, 0, 2e5), (0, 0, 0), (0, 1, 0), np.degrees(17 / 2e5), 1700, 1700)
-    assert isinstance(prepare(tuple(shapes), TYPES)[1].many_spheres, SphereGrid)
+    assert isinstance(prepare(tuple(shapes), TYPES)[1].geometry.many_spheres, SphereGrid)
     image = drpt.render(drpt.Scene(camera, shapes), 1, 0, "implicit").image[..., 0]
     assert image.mean() == pytest.approx(np.pi * 0.3**2, rel=2e-3)
 
@@ -204,7 +204,7 @@ def test_pictures_of_many_spheres_are_lit(hierarchy: type) -> None:
         for i, c in enumerate(centers)
     ]
     camera = drpt.Camera((0, 0, 6), (0, 0, 0), (0, 1, 0), 20, 32, 32)
-    assert isinstance(prepare(tuple(shapes), TYPES)[1].many_spheres, hierarchy)
+    assert isinstance(prepare(tuple(shapes), TYPES)[1].geometry.many_spheres, hierarchy)
     means = [
         drpt.render(drpt.Scene(camera, shapes), 64, 2, mode).image.mean()
         for mode in ("implicit", "mis")

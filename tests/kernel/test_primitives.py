@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.primitives import DIFFUSE, Primitives, make_primitives
+from drpt.kernel.primitives import Primitives, make_primitives
 from tests.oracle.geometry import any_hit
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ GLOSSY = drpt.Phong((0.1, 0.2, 0.3), 40)
 CAMERA = drpt.Camera((0, 0, 9), (0, 0, 0), (0, 1, 0), 40, 8, 8)
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 QUAD = [[0, 1, 2], [0, 2, 3]]
+
+DIFFUSE = -1.0  # code of the material
 
 
 def prepare(*shapes: Shape) -> Primitives:

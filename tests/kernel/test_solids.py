@@ -157,7 +157,7 @@ class World:
         self.shapes = shapes if shapes[-1].is_light else [*shapes, lamp]
         scene = drpt.Scene(camera, self.shapes)
         launcher = make_launcher(TYPES, scene, 1, Mode.MIS, "independent", jitter=False)
-        self.scene, self.features = launcher.tracer.scene, launcher.tracer.features
+        self.scene, self.features = launcher.tracer.scene.geometry, launcher.tracer.features
 
     def closest(self, origins: Floats, directions: Floats) -> dict[str, Floats]:
         hit = closest_hit(

@@ -5,7 +5,7 @@ All directions point away from the surface. f is per steradian; densities are pe
 
 import numpy as np
 
-from drpt.scene import Diffuse, Phong
+from drpt.scene import Diffuse, Material, Phong
 from tests.oracle.arrays import Bools, Floats, basis, dot, normalize, sample_uniform_sphere
 
 
@@ -26,7 +26,7 @@ def turn_to_viewer(
 
 
 def evaluate(
-    material: Diffuse | Phong,
+    material: Material,
     geometric_normal: Floats,
     shading_normal: Floats,
     wo: Floats,
@@ -40,13 +40,14 @@ def evaluate(
     if isinstance(material, Diffuse):
         value = np.full(len(wi), 1 / np.pi)
     else:
+        assert isinstance(material, Phong)
         value = _lobe(material.exponent, dot(_mirror(ns, wo), wi))
     cosine = np.where(_counts(ng, ns, wo, wi), dot(ns, wi), 0.0)
     return (value * cosine)[:, None] * np.asarray(material.albedo, np.float64)
 
 
 def density(
-    material: Diffuse | Phong,
+    material: Material,
     geometric_normal: Floats,
     shading_normal: Floats,
     wo: Floats,
@@ -60,12 +61,13 @@ def density(
     if isinstance(material, Diffuse):
         value = dot(ns, wi) / np.pi
     else:
+        assert isinstance(material, Phong)
         value = _lobe(material.exponent, dot(_mirror(ns, wo), wi))
     return np.where(_counts(ng, ns, wo, wi), value, 0.0)
 
 
 def sample(
-    material: Diffuse | Phong,
+    material: Material,
     geometric_normal: Floats,
     shading_normal: Floats,
     wo: Floats,
@@ -79,6 +81,7 @@ def sample(
     _, ns = turn_to_viewer(geometric_normal, shading_normal, wo)
     if isinstance(material, Diffuse):
         return normalize(ns + sample_uniform_sphere(rng, len(wo)))
+    assert isinstance(material, Phong)
     log_cos = np.log1p(-rng.random(len(wo))) / (material.exponent + 1)
     cos_gamma, sin_gamma = np.exp(log_cos), np.sqrt(-np.expm1(2 * log_cos))
     phi = 2 * np.pi * rng.random(len(wo))

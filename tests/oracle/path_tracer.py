@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drpt.scene import Camera, Diffuse, Mesh, Phong, Scene, Sphere
+from drpt.scene import Camera, Material, Mesh, Scene, Sphere
 from tests.oracle import brdf
 from tests.oracle.arrays import Bools, Floats, Ints, dot, normalize, sample_uniform_sphere
 from tests.oracle.geometry import Hits, any_hit, closest_hit
@@ -183,7 +183,7 @@ def _reflects(scene: Scene, hits: Hits) -> Bools:
     return np.isin(hits.shape, reflecting)
 
 
-def _hits_by_material(scene: Scene, hits: Hits) -> Iterator[tuple[Diffuse | Phong, Bools]]:
+def _hits_by_material(scene: Scene, hits: Hits) -> Iterator[tuple[Material, Bools]]:
     for index, shape in enumerate(scene.shapes):
         at = hits.shape == index
         if shape.material is not None and at.any():

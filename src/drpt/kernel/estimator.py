@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from drpt.kernel.primitives import FACET_LIMIT, LIGHT_FACET_LIMIT
+from drpt.scene.materials import MATERIALS
 
 if TYPE_CHECKING:
     from drpt.kernel.primitives import Primitives
@@ -67,15 +68,11 @@ class Features:
     ----------
     spheres, triangles, interpolated_normals
         Intersections with them, and the normals that they have.
-    diffuse, phong
-        Reflection of that kind.
     emission
         Radiance of lights that paths run into; without ``mis``, in modes that sample lights, camera
         rays alone do.
-    direct_light, light_choice
-        Samples of lights at every vertex, and the choice among several.
-    sphere_light_samples, triangle_light_samples
-        Samples of lights of that kind.
+    direct_light
+        Samples of lights at every vertex.
     mis
         Weights for both ways to find a light.
     guiding
@@ -93,13 +90,8 @@ class Features:
     spheres: bool
     triangles: bool
     interpolated_normals: bool
-    diffuse: bool
-    phong: bool
     emission: bool
     direct_light: bool
-    light_choice: bool
-    sphere_light_samples: bool
-    triangle_light_samples: bool
     mis: bool
     guiding: bool
     covered_pixels: bool
@@ -163,14 +155,16 @@ def layout_facts(
 
 def _shape_facts(primitives: Primitives, bounces: int) -> dict[str, Fact]:
     lit, reflecting = _lit(primitives), _reflecting(primitives, bounces)
-    smooth, surfaces = len(primitives.smooth_corners), len(primitives.diffuse)
-    diffuse = int(primitives.diffuse.sum())
+    smooth, codes = len(primitives.smooth_corners), primitives.reflectance[:, 3]
+    kinds = {
+        kind.name: _some(int(kind.has(codes).sum()), f"{kind.label} surface", *reflecting)
+        for kind in MATERIALS
+    }
     return {
         "spheres": _some(len(primitives.spheres), "sphere", *lit),
         "triangles": _some(len(primitives.planes), "polygon", *lit),
         "interpolated_normals": _some(smooth, "smooth triangle", *reflecting),
-        "diffuse": _some(diffuse, "diffuse surface", *reflecting),
-        "phong": _some(surfaces - diffuse, "Phong surface", *reflecting),
+        **kinds,
     }
 
 

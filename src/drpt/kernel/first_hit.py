@@ -16,7 +16,6 @@ import numpy as np
 
 from drpt.immutable import immutable
 from drpt.kernel.backend import interrupts_put_off
-from drpt.kernel.brdf import make_brdf
 from drpt.kernel.camera import make_camera, picture_plane
 from drpt.kernel.estimator import Features, Mode
 from drpt.kernel.intersect import closest_hit
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from drjit.auto import Array3f
     from numpy.typing import NDArray
 
-    from drpt.kernel.brdf import Brdf
+    from drpt.kernel.bsdfs import Bsdf
     from drpt.kernel.camera import Ray
     from drpt.kernel.intersect import Hit, Known
     from drpt.kernel.primitives import Primitives
@@ -143,7 +142,6 @@ def _features(primitives: Primitives) -> Features:
         spheres=len(primitives.spheres) > 0,
         triangles=len(primitives.planes) > 0,
         interpolated_normals=len(primitives.smooth_corners) > 0,
-        diffuse=len(primitives.reflectance) > 0,
     )
 
 
@@ -173,24 +171,24 @@ class _FirstHitTracer(Tracer, ABC):
 
     def first_vertex(self, ray: Ray, sampler: Sampler, known: Known | None = None) -> Vertex:
         path = self.start(ray)
-        hit = closest_hit(self.scene, self.features, ray, path.active, known)
-        brdf = make_brdf(self.features, hit, -ray.direction)
-        feature = dr.select(hit.valid, self._feature(ray, hit, brdf), 0)
-        return Vertex(path._replace(radiance=feature), hit, brdf, path.patch)
+        hit = closest_hit(self.scene.geometry, self.features, ray, path.active, known)
+        bsdf = self.bsdf(hit, -ray.direction)
+        feature = dr.select(hit.valid, self._feature(ray, hit, bsdf), 0)
+        return Vertex(path._replace(radiance=feature), hit, bsdf, path.patch)
 
     @abstractmethod
-    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+    def _feature(self, ray: Ray, hit: Hit, bsdf: Bsdf) -> Array3f:
         """The feature of a hit; anything where there is none."""
 
 
 class _AlbedoTracer(_FirstHitTracer):
-    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
-        lit = (hit.primitive >= self.scene.first_light) & hit.front
-        return dr.select(lit, 1, brdf.albedo)
+    def _feature(self, ray: Ray, hit: Hit, bsdf: Bsdf) -> Array3f:
+        lit = (hit.primitive >= self.scene.geometry.first_light) & hit.front
+        return dr.select(lit, 1, bsdf.albedo)
 
 
 class _NormalTracer(_FirstHitTracer):
-    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+    def _feature(self, ray: Ray, hit: Hit, bsdf: Bsdf) -> Array3f:
         """The normal of a light is not of unit length, and 0 where its centre rounds to the hit."""
         length = dr.norm(hit.shading_normal)
         return dr.select(length > 0, hit.shading_normal / length, -ray.direction)
@@ -199,7 +197,7 @@ class _NormalTracer(_FirstHitTracer):
 class _PlaceTracer(_FirstHitTracer):
     """The number of the primitive plus 1, the distance, and 1 if the front is hit, else 0."""
 
-    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+    def _feature(self, ray: Ray, hit: Hit, bsdf: Bsdf) -> Array3f:
         kind = type(hit.distance)
         return vec3(kind(hit.primitive + 1), hit.distance, dr.select(hit.front, kind(1), 0))
 
@@ -210,7 +208,7 @@ class _DepthTracer(_FirstHitTracer):
 
     forward: Array3f
 
-    def _feature(self, ray: Ray, hit: Hit, brdf: Brdf) -> Array3f:
+    def _feature(self, ray: Ray, hit: Hit, bsdf: Bsdf) -> Array3f:
         depth = hit.distance * dr.dot(ray.direction, self.forward)
         one = type(depth)(1)
         return vec3(depth, one, one)

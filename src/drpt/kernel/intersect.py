@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 import drjit as dr
 
-from drpt.kernel.device_scene import SurfaceRow
 from drpt.kernel.meet import (
     across,
     dot_constant,
@@ -16,6 +15,7 @@ from drpt.kernel.meet import (
     power_of_point,
     solid_blocks,
 )
+from drpt.kernel.scene_geometry import SurfaceRow
 from drpt.kernel.vec import greater, largest, types_of, vec3
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from drjit.auto import Array3f, Array4f, Bool, Float, UInt32
 
     from drpt.kernel.camera import Ray
-    from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features
     from drpt.kernel.meet import Ball
+    from drpt.kernel.scene_geometry import SceneGeometry
 
     Visit: TypeAlias = Callable[[UInt32, Bool, Float, Float, UInt32], tuple[Float, UInt32]]
 
@@ -86,8 +86,8 @@ class Hit(NamedTuple):
 
     ``point`` lies off the surface by its rounding error, towards where the ray comes from, and both
     unit normals face that side. ``front`` tells whether it is the side that emits: outside
-    of a sphere, the counter-clockwise side of a triangle. ``albedo`` and ``exponent`` tell how it
-    reflects; a light does not.
+    of a sphere, the counter-clockwise side of a triangle. ``material`` is the row of its material,
+    black on lights.
     """
 
     valid: Bool
@@ -97,85 +97,84 @@ class Hit(NamedTuple):
     normal: Array3f
     shading_normal: Array3f
     front: Bool
-    albedo: Array3f
-    exponent: Float
+    material: Array4f
 
 
 def closest_hit(
-    scene: DeviceScene, features: Features, ray: Ray, active: Bool, known: Known | None = None
+    geometry: SceneGeometry, features: Features, ray: Ray, active: Bool, known: Known | None = None
 ) -> Hit:
     """The first surface that a ray meets; it is looked for where it is not known."""
     if known is None:
-        nearest, primitive = _nearest(scene, ray, active)
-        row = scene.surface_row(primitive, active & (nearest < dr.inf))
+        nearest, primitive = _nearest(geometry, ray, active)
+        row = geometry.row(primitive, active & (nearest < dr.inf))
     else:
-        nearest, primitive, row = _known_or_nearest(scene, ray, active, known)
-    return _surface(scene, features, ray, nearest, primitive, row, active & (nearest < dr.inf))
+        nearest, primitive, row = _known_or_nearest(geometry, ray, active, known)
+    return _surface(geometry, features, ray, nearest, primitive, row, active & (nearest < dr.inf))
 
 
-def _nearest(scene: DeviceScene, ray: Ray, active: Bool) -> tuple[Float, UInt32]:
+def _nearest(geometry: SceneGeometry, ray: Ray, active: Bool) -> tuple[Float, UInt32]:
     """How far it is to the first primitive that a ray meets, and its number."""
-    nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(0)
-    for solid in scene.solids:
+    nearest, primitive = geometry.types.Float32(dr.inf), geometry.types.UInt32(0)
+    for solid in geometry.solids:
         number, met, t = meet_solid(ray, solid)
         closer = met & (t < nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
-    for number, met, t in _surfaces_and_balls(scene, ray, active):
+    for number, met, t in _surfaces_and_balls(geometry, ray, active):
         closer = met & (t <= nearest)
         nearest = dr.select(closer, t, nearest)
         primitive = dr.select(closer, number, primitive)
-    if scene.many_spheres is not None:
-        nearest, primitive = _or_of_many(scene.many_spheres, ray, active, nearest, primitive)
-    return _or_light_triangle(scene, ray, active, nearest, primitive)
+    if geometry.many_spheres is not None:
+        nearest, primitive = _or_of_many(geometry.many_spheres, ray, active, nearest, primitive)
+    return _or_light_triangle(geometry, ray, active, nearest, primitive)
 
 
 def _known_or_nearest(
-    scene: DeviceScene, ray: Ray, active: Bool, known: Known
+    geometry: SceneGeometry, ray: Ray, active: Bool, known: Known
 ) -> tuple[Float, UInt32, SurfaceRow]:
     """The same, and the row of the primitive; lanes of which all is known jump over the search."""
 
     def look_up() -> tuple[Any, ...]:
-        plane = known.row.geometry
+        plane = known.row.shape
         normal = vec3(plane[0], plane[1], plane[2])
         height = plane[3] - dr.dot(normal, ray.origin)
         return height * dr.rcp(dr.dot(normal, ray.direction)), known.facet, *known.row
 
     def search() -> tuple[Any, ...]:
-        nearest, primitive = _nearest(scene, ray, active)
-        return nearest, primitive, *scene.surface_row(primitive, active & (nearest < dr.inf))
+        nearest, primitive = _nearest(geometry, ray, active)
+        return nearest, primitive, *geometry.row(primitive, active & (nearest < dr.inf))
 
     nearest, primitive, *row = dr.if_stmt((), known.facet != UNKNOWN, look_up, search)
     return nearest, primitive, SurfaceRow(*row)
 
 
-def light_hit(scene: DeviceScene, features: Features, ray: Ray, active: Bool) -> Hit:
+def light_hit(geometry: SceneGeometry, features: Features, ray: Ray, active: Bool) -> Hit:
     """The first surface that a ray from a surface meets if that is a light, else nothing.
 
     Few lights are looked for first, and where there is one, what stands before it.
     """
-    if scene.many_spheres is not None or scene.light_mesh is not None:
-        hit = closest_hit(scene, features, ray, active)
-        return hit._replace(valid=hit.valid & (hit.primitive >= scene.first_light))
-    nearest, primitive = scene.types.Float32(dr.inf), scene.types.UInt32(scene.first_light)
-    for number, ball in scene.balls:
-        if number >= scene.first_light:
+    if geometry.many_spheres is not None or geometry.light_mesh is not None:
+        hit = closest_hit(geometry, features, ray, active)
+        return hit._replace(valid=hit.valid & (hit.primitive >= geometry.first_light))
+    nearest, primitive = geometry.types.Float32(dr.inf), geometry.types.UInt32(geometry.first_light)
+    for number, ball in geometry.balls:
+        if number >= geometry.first_light:
             met, t = meet_sphere(ray, ball)
             closer = met & (t <= nearest)
             nearest = dr.select(closer, t, nearest)
             primitive = dr.select(closer, number, primitive)
-    nearest, primitive = _or_light_triangle(scene, ray, active, nearest, primitive)
+    nearest, primitive = _or_light_triangle(geometry, ray, active, nearest, primitive)
     seen = active & (nearest < dr.inf)
-    seen &= ~occluded(scene, ray, nearest, primitive - scene.first_light, seen)
-    row = scene.surface_row(primitive, seen)
-    return _surface(scene, features, ray, nearest, primitive, row, seen)
+    seen &= ~occluded(geometry, ray, nearest, primitive - geometry.first_light, seen)
+    row = geometry.row(primitive, seen)
+    return _surface(geometry, features, ray, nearest, primitive, row, seen)
 
 
 def _or_light_triangle(
-    scene: DeviceScene, ray: Ray, active: Bool, nearest: Float, primitive: UInt32
+    geometry: SceneGeometry, ray: Ray, active: Bool, nearest: Float, primitive: UInt32
 ) -> tuple[Float, UInt32]:
     """The distance and number of a light's triangle that is nearer than what has been found."""
-    for number, met, t, front in _light_triangles(scene, ray, active):
+    for number, met, t, front in _light_triangles(geometry, ray, active):
         slack = _slack(ray, t)
         closer = met & (t + dr.select(front, -slack, slack) < nearest)
         nearest = dr.select(closer, t, nearest)
@@ -183,26 +182,28 @@ def _or_light_triangle(
     return nearest, primitive
 
 
-def occluded(scene: DeviceScene, ray: Ray, distance: Float, light: UInt32, active: Bool) -> Bool:
+def occluded(
+    geometry: SceneGeometry, ray: Ray, distance: Float, light: UInt32, active: Bool
+) -> Bool:
     """Whether a ray meets anything before the light at this ``distance``, or on top of it."""
-    target = scene.first_light + light
+    target = geometry.first_light + light
     slack = _slack(ray, distance)
     before, beyond = distance - slack, distance + slack
-    blocked = scene.types.Bool(False)
-    if scene.mesh is not None:
-        blocked = scene.mesh.blocks(ray, before, active)
-    for solid in scene.solids:
+    blocked = geometry.types.Bool(False)
+    if geometry.mesh is not None:
+        blocked = geometry.mesh.blocks(ray, before, active)
+    for solid in geometry.solids:
         if solid.shading:
             blocked |= solid_blocks(ray, solid, before)
-    for number, met, t in _surfaces_and_balls(scene, ray, active, target):
-        reflects = isinstance(number, int) and number < scene.first_light
+    for number, met, t in _surfaces_and_balls(geometry, ray, active, target):
+        reflects = isinstance(number, int) and number < geometry.first_light
         reach = before if reflects else dr.select(number > target, beyond, before)
         blocked |= met & (t < reach)
-    for number, met, t, front in _light_triangles(scene, ray, active, target):
+    for number, met, t, front in _light_triangles(geometry, ray, active, target):
         blocked |= met & (t < dr.select(front & (number > target), beyond, before))
-    if scene.many_spheres is not None:
+    if geometry.many_spheres is not None:
         open_ = active & ~blocked
-        blocked |= _many_block(scene.many_spheres, ray, open_, target, before, beyond)
+        blocked |= _many_block(geometry.many_spheres, ray, open_, target, before, beyond)
     return blocked
 
 
@@ -211,21 +212,21 @@ def _slack(ray: Ray, t: Float) -> Float:
 
 
 def _surfaces_and_balls(
-    scene: DeviceScene, ray: Ray, active: Bool, target: UInt32 | None = None
+    geometry: SceneGeometry, ray: Ray, active: Bool, target: UInt32 | None = None
 ) -> Iterator[tuple[Any, Bool, Float]]:
     """What a ray may meet first: a primitive's number, whether it is met beyond 0, and where.
 
     For shadow rays, ``target`` is the number of the light that they lead to, which casts none; a
     mesh is asked about those as a whole.
     """
-    if scene.mesh is not None and target is None:
-        yield scene.mesh.closest(ray, active)
-    for number, facet, blocks in scene.loose_facets:
+    if geometry.mesh is not None and target is None:
+        yield geometry.mesh.closest(ray, active)
+    for number, facet, blocks in geometry.loose_facets:
         if blocks or target is None:
             yield number, *meet_facet(ray, facet)
-    for number, ball in scene.balls:
+    for number, ball in geometry.balls:
         met, t = meet_sphere(ray, ball)
-        is_light = number >= scene.first_light
+        is_light = number >= geometry.first_light
         yield number, met & (target != number) if is_light and target is not None else met, t
 
 
@@ -261,24 +262,24 @@ def _many_block(
 
 
 def _light_triangles(
-    scene: DeviceScene, ray: Ray, active: Bool, target: UInt32 | None = None
+    geometry: SceneGeometry, ray: Ray, active: Bool, target: UInt32 | None = None
 ) -> Iterator[tuple[Any, Bool, Float, Bool]]:
     """The same of the triangles that emit, and whether a ray meets their front."""
-    first = scene.first_light + scene.sphere_lights
-    for number, facet in enumerate(scene.light_facets, start=first):
+    first = geometry.first_light_triangle
+    for number, facet in enumerate(geometry.light_facets, start=first):
         met, t = meet_facet(ray, facet)
         front = dot_constant(facet.normal, ray.direction) < 0
         yield number, met if target is None else met & (target != number), t, front
-    if scene.light_mesh is not None:
-        index, met, t = scene.light_mesh.closest(ray, active)
+    if geometry.light_mesh is not None:
+        index, met, t = geometry.light_mesh.closest(ray, active)
         found = first + index
-        plane = scene.surface_row(found, met).geometry
+        plane = geometry.row(found, met).shape
         front = dr.dot(vec3(plane[0], plane[1], plane[2]), ray.direction) < 0
         yield found, met if target is None else met & (target != found), t, front
 
 
 def _surface(
-    scene: DeviceScene,
+    geometry: SceneGeometry,
     features: Features,
     ray: Ray,
     t: Float,
@@ -287,18 +288,18 @@ def _surface(
     valid: Bool,
 ) -> Hit:
     p = dr.fma(ray.direction, t, ray.origin)
-    point, normal, reach = _on_primitive(scene, features, row.geometry, p, ray, primitive)
+    point, normal, reach = _on_primitive(geometry, features, row.shape, p, ray, primitive)
     front = dr.dot(normal, ray.direction) < 0
     facing = dr.select(front, normal, -normal)
     shading_normal = facing
     if features.interpolated_normals:
-        shading_normal = _interpolated_normal(scene, point, facing, primitive, valid)
-    if scene.reach is not None:
-        in_mesh = valid & (primitive < scene.first_sphere)
-        reach = greater(reach, dr.gather(type(t), scene.reach, primitive, in_mesh))
-    away = _away(scene, features, facing, ray.direction, primitive)
+        shading_normal = _interpolated_normal(geometry, point, facing, primitive, valid)
+    if geometry.reach is not None:
+        in_mesh = valid & (primitive < geometry.first_sphere)
+        reach = greater(reach, dr.gather(type(t), geometry.reach, primitive, in_mesh))
+    away = _away(geometry, features, facing, ray.direction, primitive)
     spawn = dr.fma(away, SPAWN_OFFSET * reach, point)
-    return Hit(valid, t, primitive, spawn, facing, shading_normal, front, row.albedo, row.exponent)
+    return Hit(valid, t, primitive, spawn, facing, shading_normal, front, row.material)
 
 
 _Place: TypeAlias = "tuple[Array3f, Array3f, Float]"
@@ -306,43 +307,52 @@ _Place: TypeAlias = "tuple[Array3f, Array3f, Float]"
 
 
 def _away(
-    scene: DeviceScene, features: Features, facing: Array3f, direction: Array3f, primitive: UInt32
+    geometry: SceneGeometry,
+    features: Features,
+    facing: Array3f,
+    direction: Array3f,
+    primitive: UInt32,
 ) -> Array3f:
     """Where to step off what a ray in a direction has hit: see `SPAWN_OFFSET`."""
     if not features.triangles:
         return facing
-    if not _some_spheres_reflect(scene, features):
+    if not _some_spheres_reflect(geometry, features):
         return facing - direction
-    return dr.select(_is_sphere(scene, primitive), facing, facing - direction)
+    return dr.select(_is_sphere(geometry, primitive), facing, facing - direction)
 
 
-def _some_spheres_reflect(scene: DeviceScene, features: Features) -> bool:
-    return features.spheres and scene.first_light > scene.first_sphere
+def _some_spheres_reflect(geometry: SceneGeometry, features: Features) -> bool:
+    return features.spheres and geometry.first_light > geometry.first_sphere
 
 
-def _is_sphere(scene: DeviceScene, primitive: UInt32) -> Bool:
-    end = scene.first_sphere + scene.sphere_count
-    return (primitive >= scene.first_sphere) & (primitive < end)
+def _is_sphere(geometry: SceneGeometry, primitive: UInt32) -> Bool:
+    end = geometry.first_sphere + geometry.sphere_count
+    return (primitive >= geometry.first_sphere) & (primitive < end)
 
 
 def _on_primitive(
-    scene: DeviceScene, features: Features, row: Array4f, p: Array3f, ray: Ray, primitive: UInt32
+    geometry: SceneGeometry,
+    features: Features,
+    row: Array4f,
+    p: Array3f,
+    ray: Ray,
+    primitive: UInt32,
 ) -> _Place:
     if not features.spheres:
         return _on_facet(row, p)
-    if scene.afar:
+    if geometry.afar:
         on_sphere = _on_sphere_afar(row, ray)
-    elif _some_spheres_reflect(scene, features):
+    elif _some_spheres_reflect(geometry, features):
         on_sphere = _on_sphere(row, p, ray)
     else:
         on_sphere = _on_sphere_light(row, p)
-    for number, ball in scene.balls:
+    for number, ball in geometry.balls:
         if ball.power is not None:
             on_ball = _on_large_sphere(ball, ball.power, p)
             on_sphere = dr.select(primitive == number, on_ball, on_sphere)
     if not features.triangles:
         return on_sphere
-    return dr.select(_is_sphere(scene, primitive), on_sphere, _on_facet(row, p))
+    return dr.select(_is_sphere(geometry, primitive), on_sphere, _on_facet(row, p))
 
 
 def _on_facet(row: Array4f, p: Array3f) -> _Place:
@@ -392,17 +402,17 @@ def _on_sphere_light(row: Array4f, p: Array3f) -> _Place:
 
 
 def _interpolated_normal(
-    scene: DeviceScene, point: Array3f, facing: Array3f, primitive: UInt32, valid: Bool
+    geometry: SceneGeometry, point: Array3f, facing: Array3f, primitive: UInt32, valid: Bool
 ) -> Array3f:
     """The corners' normals weighted by barycentric coordinates, on the side of ``facing``.
 
     That is ``facing`` itself where the corners round to a line, and where the normals cancel.
     """
-    types = scene.types
-    smooth = valid & (primitive >= scene.first_smooth) & (primitive < scene.first_sphere)
-    first = 6 * (primitive - scene.first_smooth)
+    types = geometry.types
+    smooth = valid & (primitive >= geometry.first_smooth) & (primitive < geometry.first_sphere)
+    first = 6 * (primitive - geometry.first_smooth)
     a, b, c, normal_a, normal_b, normal_c = (
-        dr.gather(types.Array3f, scene.smooth, first + k, smooth) for k in range(6)
+        dr.gather(types.Array3f, geometry.smooth, first + k, smooth) for k in range(6)
     )
     edge_b, edge_c, spoke = b - a, c - a, point - a
     area = dr.cross(edge_b, edge_c)

@@ -192,7 +192,7 @@ def make_launcher(
     device_scene = device_scene.seen_from(scene.camera.eye - primitives.origin, primitives)
     shares = guide_shares(scene, bounces, mode, types)
     features = Features.of(primitives, bounces, mode, worthwhile=shares is not None)
-    if not (features.diffuse or features.phong):
+    if not len(primitives.reflectance):
         bounces = 0
     guide = learned(scene.shapes, types) if shares else None
     tracer = Tracer(device_scene, features, mode, bounces, guide=guide, shares=shares)

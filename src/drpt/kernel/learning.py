@@ -114,5 +114,5 @@ class _Exchange:
         return dr.select(seen & dr.isfinite(light), light, 0)
 
     def _normal(self, spot: Spot) -> Array3f:
-        plane = self.tracer.scene.surface_row(spot.facet).geometry
+        plane = self.tracer.scene.geometry.row(spot.facet).shape
         return vec3(plane[0], plane[1], plane[2])

@@ -23,24 +23,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
-from drpt.kernel.brdf import Brdf, make_brdf
 from drpt.kernel.camera import Ray
+from drpt.kernel.emitters import LightSample, Receiver, power_heuristic
 from drpt.kernel.guide import NOWHERE
 from drpt.kernel.intersect import Hit, Known, closest_hit, light_hit, occluded
-from drpt.kernel.light import (
-    LightSample,
-    Receiver,
-    choose_light,
-    inverse_pdf,
-    power_heuristic,
-    sample_light,
-)
 from drpt.kernel.vec import vec2
 from drpt.kernel.warp import cosine_hemisphere_pdf, sphere_pdf, square_to_sphere
 
 if TYPE_CHECKING:
     from drjit.auto import Array2f, Array3f, Bool, Float, UInt32
 
+    from drpt.kernel.bsdfs import Bsdf
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.estimator import Features, Mode
     from drpt.kernel.guide import Guide
@@ -72,7 +65,7 @@ class Vertex(NamedTuple):
 
     path: Path
     hit: Hit
-    brdf: Brdf
+    bsdf: Bsdf
     patch: UInt32  # of the guide; 0 where nothing is guided
     share: Any = 0  # of the directions from here that the guide chooses
 
@@ -177,13 +170,15 @@ class Tracer:
             weighted = features.mis and is_first is not True
             emitted = self._emission(path, hit, counts, weighted=weighted)
             radiance = radiance + path.beta * emitted
-        hit = hit._replace(valid=hit.valid & (hit.primitive < self.scene.first_light) & reflects)
-        brdf = make_brdf(features, hit, -path.direction)
+        hit = hit._replace(
+            valid=hit.valid & (hit.primitive < self.scene.geometry.first_light) & reflects
+        )
+        bsdf = self.bsdf(hit, -path.direction)
         # The last segment can only hit a light; do not guide it.
-        guided = brdf.is_diffuse & (depth + 1 < self.bounces)
+        guided = bsdf.is_diffuse & (depth + 1 < self.bounces)
         patch = dr.select(guided, patch, type(patch)(0))
         share = self._share(patch, depth + 1)
-        vertex = Vertex(path, hit, brdf, patch, share)
+        vertex = Vertex(path, hit, bsdf, patch, share)
         if features.direct_light and reflects is not False:
             light, traced = self._direct(vertex, sampler, depth)
             radiance = radiance + path.beta * light
@@ -195,8 +190,8 @@ class Tracer:
         is_first, ray = depth == 0, Ray(path.origin, path.direction)
         is_end = depth == self.bounces
         if is_end is True and is_first is False:  # that ray was not guided
-            return path, light_hit(self.scene, self.features, ray, path.active), path.patch
-        hit = closest_hit(self.scene, self.features, ray, path.active, known)
+            return path, light_hit(self.scene.geometry, self.features, ray, path.active), path.patch
+        hit = closest_hit(self.scene.geometry, self.features, ray, path.active, known)
         if self.guide is None:
             return path, hit, path.patch
         patch = self.guide.patch_of(hit)
@@ -211,8 +206,8 @@ class Tracer:
         lost = (path.aim != NOWHERE) & ~(hit.valid & (hit.primitive == path.aim))
         density = self._share(path.patch, depth) * guide.density(path.patch, patch)
         by_guide = density * dr.square(hit.distance)
-        by_brdf = path.pdf * dr.abs(dr.dot(hit.normal, path.direction))
-        weight = dr.select(by_guide > 0, by_brdf / (by_brdf + by_guide), 1)
+        by_bsdf = path.pdf * dr.abs(dr.dot(hit.normal, path.direction))
+        weight = dr.select(by_guide > 0, by_bsdf / (by_bsdf + by_guide), 1)
         beta = path.beta * dr.select(lost, 0, weight)
         return path._replace(beta=beta), hit._replace(valid=hit.valid & ~lost)
 
@@ -236,29 +231,29 @@ class Tracer:
 
     def _turn(self, vertex: Vertex, u: Array2f) -> Turn:
         """The direction in which a path goes on."""
-        brdf, types = vertex.brdf, self.scene.types
+        bsdf, types = vertex.bsdf, self.scene.types
         nowhere = types.UInt32(NOWHERE)
         if not self.mode.samples_brdf:
             direction = square_to_sphere(u)
-            return Turn(direction, brdf.eval(direction) / sphere_pdf(), vertex.path.pdf, nowhere)
+            return Turn(direction, bsdf.eval(direction) / sphere_pdf(), vertex.path.pdf, nowhere)
         if self.guide is not None:
             return self._guided_turn(vertex, u, self.guide)
-        sample = brdf.sample(u)
+        sample = bsdf.sample(u)
         pdf = sample.pdf if self.features.mis else vertex.path.pdf
         return Turn(sample.direction, sample.weight, pdf, nowhere)
 
     def _guided_turn(self, vertex: Vertex, u: Array2f, guide: Guide) -> Turn:
         """A direction to a point of a patch, or by the BRDF."""
-        brdf, share = vertex.brdf, vertex.share
+        bsdf, share = vertex.bsdf, vertex.share
         guided, unguided = u.x < share, 1 - share
         u = vec2(dr.select(guided, u.x / share, (u.x - share) / unguided), u.y)
         aimed, facet = guide.aim(vertex.patch, vertex.hit.point, u, guided)
-        sample = brdf.sample(u)
+        sample = bsdf.sample(u)
         direction = dr.select(guided, aimed, sample.direction)
-        of_aimed = cosine_hemisphere_pdf(dr.dot(brdf.shading_normal, aimed))
+        of_aimed = cosine_hemisphere_pdf(dr.dot(bsdf.point.shading_normal, aimed))
         pdf = unguided * dr.select(guided, of_aimed, sample.pdf)
         aim = dr.select(guided, facet, NOWHERE)
-        return Turn(direction, brdf.weight(direction) / unguided, pdf, aim)
+        return Turn(direction, bsdf.weight(direction) / unguided, pdf, aim)
 
     def _share(self, patch: UInt32, following: Any) -> Any:
         """The guide's share of the directions from a patch to vertex number ``following``."""
@@ -266,15 +261,15 @@ class Tracer:
 
     def _emission(self, path: Path, hit: Hit, counts: Bool | bool, *, weighted: bool) -> Array3f:
         """L_e at a hit; weighted against light sampling where a BRDF's density led there."""
-        scene = self.scene
-        lit = hit.valid & (hit.primitive >= scene.first_light) & hit.front & counts
-        light = scene.types.UInt32(0)
-        if scene.light_count > 1:
-            light = dr.select(lit, hit.primitive - scene.first_light, 0)
-        radiance = scene.light_row(light).radiance
+        first, emitters = self.scene.geometry.first_light, self.scene.emitters
+        lit = hit.valid & (hit.primitive >= first) & hit.front & counts
+        light = self.scene.types.UInt32(0)
+        if emitters.count > 1:
+            light = dr.select(lit, hit.primitive - first, 0)
+        radiance = emitters.radiance(light)
         if weighted:
             at, ray = Receiver(path.origin, path.normal), Ray(path.origin, path.direction)
-            inverse = inverse_pdf(scene, self.features, at, light, ray, hit._replace(valid=lit))
+            inverse = emitters.inverse_pdf(at, light, ray, hit._replace(valid=lit))
             radiance = radiance * power_heuristic(1 / (inverse * path.pdf))
         return dr.select(lit, radiance, 0)
 
@@ -282,17 +277,17 @@ class Tracer:
         self, vertex: Vertex, sampler: Sampler, depth: int | UInt32
     ) -> tuple[Array3f, Bool]:
         """Direct light by one sample of one light, and where that took a shadow ray."""
-        hit, brdf = vertex.hit, vertex.brdf
+        hit, bsdf = vertex.hit, vertex.bsdf
         light, sample = self.light_sample(hit, sampler, depth)
-        value = brdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
+        value = bsdf.eval(sample.direction) * sample.radiance * sample.inverse_pdf
         if self.features.mis:
-            pdf = brdf.pdf(sample.direction)
+            pdf = bsdf.pdf(sample.direction)
             if self.guide is not None:
                 pdf *= 1 - vertex.share
             value *= power_heuristic(pdf * sample.inverse_pdf)
         traced = hit.valid & ~(dr.max(value) <= 0)
         ray = Ray(hit.point, sample.direction)
-        shadow = occluded(self.scene, ray, sample.distance, light, traced)
+        shadow = occluded(self.scene.geometry, ray, sample.distance, light, traced)
         return dr.select(traced & ~shadow, value, 0), traced
 
     def light_sample(
@@ -301,9 +296,15 @@ class Tracer:
         """The number of the light that a vertex looks at, and the sampled point of it."""
         at = Receiver(hit.point, hit.shading_normal)
         number = lambda: sampler.next_1d(_decision(depth, 0))  # noqa: E731
-        choice = choose_light(self.scene, at, hit.valid, number)
+        emitters, visible = self.scene.emitters, self.mode.samples_cones
+        choice = emitters.choose(at, hit.valid, number)
         u = sampler.next_2d(_decision(depth, 1))
-        return choice.light, sample_light(self.scene, self.features, self.mode, at, choice, u)
+        return choice.light, emitters.sample(at, choice, u, visible=visible)
+
+    def bsdf(self, hit: Hit, to_viewer: Array3f) -> Bsdf:
+        """The BSDF at a hit, towards a viewer."""
+        smooth = self.features.interpolated_normals
+        return self.scene.materials.bsdf(hit, to_viewer, interpolated_normals=smooth)
 
 
 def _decision(depth: int | UInt32, kind: int) -> int | UInt32:

@@ -138,7 +138,7 @@ def _mean(path: Path) -> Float:
 def _patch(guide: Guide, vertex: Vertex) -> UInt32:
     """The patch from which directions are guided; 0 where they are not."""
     patch = guide.patch_of(vertex.hit)
-    return dr.select(vertex.brdf.is_diffuse, patch, type(patch)(0))
+    return dr.select(vertex.bsdf.is_diffuse, patch, type(patch)(0))
 
 
 def _ratio(guide: Guide, start: Vertex, patch: UInt32, end: Vertex) -> Float:
@@ -146,7 +146,7 @@ def _ratio(guide: Guide, start: Vertex, patch: UInt32, end: Vertex) -> Float:
     direction, hit = end.path.direction, end.hit
     by_area = guide.density(patch, guide.patch_of(hit))
     q = by_area * dr.square(hit.distance) / dr.abs(dr.dot(hit.normal, direction))
-    p = cosine_hemisphere_pdf(dr.dot(start.brdf.shading_normal, direction))
+    p = cosine_hemisphere_pdf(dr.dot(start.bsdf.point.shading_normal, direction))
     return dr.select(by_area > 0, q / p, 0)
 
 

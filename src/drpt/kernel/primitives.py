@@ -24,7 +24,8 @@ from drpt.kernel.overlaps import resolve_overlaps
 from drpt.kernel.parts import NO_TRIANGLES, NO_VECTORS, make_parts, origin_of
 from drpt.kernel.solids import make_solids
 from drpt.kernel.spheres import SphereLayout, lay_out
-from drpt.scene import Diffuse, Mesh, Phong, Sphere
+from drpt.scene import Diffuse, Mesh, Sphere
+from drpt.scene.materials import MATERIALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from drpt.kernel.overlaps import Overlap
     from drpt.kernel.parts import Part
     from drpt.kernel.solids import Solid
-    from drpt.scene import Shape
+    from drpt.scene import Material, Shape
 
     Array: TypeAlias = NDArray[np.float64]
 
@@ -48,8 +49,6 @@ LIGHT_FACET_LIMIT = 24
 """Likewise of those that emit, where Embree is as fast."""
 MERGE_LIMIT = 4 * FACET_LIMIT
 """Meshes of more triangles than this are not searched for coplanar neighbours."""
-DIFFUSE = -1.0
-"""Stands for the exponent of a diffuse surface."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Of linear sRGB (ITU-R BT.709)."""
 
@@ -77,7 +76,7 @@ class Primitives:
     sphere_lights
         How many spheres emit.
     reflectance
-        Row (albedo, exponent) of each primitive that reflects.
+        Row (albedo, code) of the material of each primitive that reflects.
     radiance
         Of each light (n, 3).
     shape
@@ -127,8 +126,15 @@ class Primitives:
 
     @property
     def diffuse(self) -> NDArray[np.bool_]:
-        """Which of the reflecting primitives are diffuse; the others are Phong."""
-        return np.asarray(self.reflectance[:, 3] == DIFFUSE)
+        """Which of the reflecting primitives are diffuse."""
+        return np.logical_or.reduce(
+            [kind.has(self.reflectance[:, 3]) for kind in MATERIALS if kind.is_diffuse]
+        )
+
+    @property
+    def kinds(self) -> tuple[type[Material], ...]:
+        """Kinds of materials of the reflecting primitives."""
+        return tuple(kind for kind in MATERIALS if kind.has(self.reflectance[:, 3]).any())
 
     @cached_property
     def facet_areas(self) -> Array:
@@ -285,9 +291,9 @@ def _coincident(corners: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _reflectance(shape: Shape) -> tuple[float, ...]:
-    """Row (albedo, exponent); a shape that neither emits nor has a material is black."""
+    """Row (albedo, code); a shape that neither emits nor has a material is black."""
     material = shape.material or Diffuse(0)
-    return (*material.albedo, material.exponent if isinstance(material, Phong) else DIFFUSE)
+    return (*material.albedo, material.code)
 
 
 def _joined(parts: list[Part], *shape: int) -> Array:

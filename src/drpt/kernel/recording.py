@@ -103,7 +103,7 @@ class _Recorder:
         vertex = tracer.arrive(fresh, sampler, depth)
         onward = tracer.leave(vertex, own, depth)
         ray = Ray(path.origin, path.direction)
-        hit = closest_hit(tracer.scene, tracer.features, ray, path.active)
+        hit = closest_hit(tracer.scene.geometry, tracer.features, ray, path.active)
         light, light_point = self._light(vertex, sampler, depth)
         looked = vertex.path.rays > 1
         dr.eval(
@@ -128,7 +128,7 @@ class _Recorder:
             return hit.primitive, hit.point
         light, sample = self.tracer.light_sample(hit, sampler, depth)
         point = dr.fma(sample.direction, sample.distance, hit.point)
-        return light + self.tracer.scene.first_light, point
+        return light + self.tracer.scene.geometry.first_light, point
 
     def _shapes(self, primitive: UInt32, valid: Bool) -> NDArray[np.intp]:
         kept = np.array(valid)

@@ -171,7 +171,7 @@ class Lanes:
         if self.covering is None:
             return None
         facet = dr.gather(self.types.UInt32, self.covering, self.pixel)
-        return Known(facet, self.tracer.scene.surface_row(facet, facet != UNKNOWN))
+        return Known(facet, self.tracer.scene.geometry.row(facet, facet != UNKNOWN))
 
     def sampler_at(self, index: UInt32) -> Sampler:
         """The sampler of a sample, or of a camera ray, of each lane's pixel."""

@@ -3,12 +3,10 @@
 from drpt.scene.builtin import builtin_names
 from drpt.scene.checks import SceneError
 from drpt.scene.files import load_scene
+from drpt.scene.materials import Diffuse, Material, Phong
 from drpt.scene.model import (
     Camera,
-    Diffuse,
-    Material,
     Mesh,
-    Phong,
     Scene,
     Shape,
     Sphere,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from numbers import Real
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeGuard
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from drpt.immutable import immutable
 from drpt.messages import one_line, shortened
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
+Colour: TypeAlias = "float | Sequence[float] | NDArray[Any]"
+Vector: TypeAlias = "Sequence[float] | NDArray[Any]"
 RGB = tuple[float, float, float]
 Point = tuple[float, float, float]
 

@@ -17,7 +17,8 @@ from drpt.messages import shortened
 from drpt.scene import checks
 from drpt.scene.builtin import builtin_names, builtin_path
 from drpt.scene.checks import SceneError
-from drpt.scene.model import Camera, Diffuse, Material, Mesh, Phong, Scene, Shape, Sphere
+from drpt.scene.materials import MATERIALS, Material
+from drpt.scene.model import Camera, Mesh, Scene, Shape, Sphere
 from drpt.scene.names import Names
 from drpt.scene.reading import read_file
 from drpt.scene.toml import parse_toml
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 Table = dict[str, Any]
 """A TOML table."""
 
-MATERIALS: dict[str, type[Material]] = {"diffuse": Diffuse, "phong": Phong}
+KINDS = {kind.name: kind for kind in MATERIALS}
+"""Kinds of materials by their names in files."""
 MAX_BYTES = 2**26
 """Largest scene file: a mesh of a million vertices fits, and it takes a minute to parse."""
 MAX_LIST = 300
@@ -124,8 +126,8 @@ def _materials(value: object) -> dict[str, Material]:
 
 
 def _material(value: object) -> Material:
-    name, parameters = _split_type(value, MATERIALS)
-    make = MATERIALS[name]
+    name, parameters = _split_type(value, KINDS)
+    make = KINDS[name]
     _check_keys(parameters, required=_field_names(make))
     return make(**parameters)
 

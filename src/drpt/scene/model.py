@@ -7,22 +7,21 @@ Lengths have no unit of their own, colours are linear RGB.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from drpt.immutable import Immutable, immutable
+from drpt.immutable import Immutable, immutable, set_fields
 from drpt.scene import checks
-from drpt.scene.checks import RGB, Point, SceneError
+from drpt.scene.checks import RGB, Colour, Point, SceneError, Vector
+from drpt.scene.materials import MATERIALS, Diffuse, Material, Phong
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
     from os import PathLike
 
     from numpy.typing import ArrayLike, NDArray
 
-    Colour: TypeAlias = float | Sequence[float] | NDArray[Any]
-    Vector: TypeAlias = Sequence[float] | NDArray[Any]
 
 MIN_SINE = 1e-6
 """Smallest sine of the angle between a camera's up and its view direction."""
@@ -58,7 +57,7 @@ class Camera:
     def __init__(
         self, eye: Vector, target: Vector, up: Vector, fov: float, width: int, height: int
     ) -> None:
-        _set(
+        set_fields(
             self,
             eye=checks.point("eye", eye),
             target=checks.point("target", target),
@@ -83,51 +82,6 @@ class Camera:
             raise checks.refuse("up", self.up, words)
 
 
-@dataclass(frozen=True, init=False)
-class Diffuse:
-    """A Lambertian surface, f = albedo / π.
-
-    Parameters
-    ----------
-    albedo
-        From 0 to 1; three values, or one for grey.
-    """
-
-    albedo: RGB
-
-    def __init__(self, albedo: Colour) -> None:
-        _set(self, albedo=checks.colour("albedo", albedo, checks.ALBEDO))
-
-
-@dataclass(frozen=True, init=False)
-class Phong:
-    """A glossy surface, f = albedo (exponent + 1) / (2π) max(0, ω_r·ω_i)^exponent.
-
-    Here ω_r is the view direction mirrored at the shading normal (Lafortune and Willems 1994;
-    their specular part alone, with exponent + 1 in place of exponent + 2).
-
-    Parameters
-    ----------
-    albedo
-        From 0 to 1; three values, or one for grey.
-    exponent
-        From 0 to 1e8; the higher, the sharper the reflection.
-    """
-
-    albedo: RGB
-    exponent: float
-
-    def __init__(self, albedo: Colour, exponent: float) -> None:
-        _set(
-            self,
-            albedo=checks.colour("albedo", albedo, checks.ALBEDO),
-            exponent=checks.number("exponent", exponent, checks.EXPONENT),
-        )
-
-
-Material: TypeAlias = Diffuse | Phong
-
-
 class _Surface:
     """What every shape has: a material or a radiance, never both."""
 
@@ -145,10 +99,11 @@ class _Surface:
         if material is not None and radiance is not None:
             raise SceneError("it has both a material and a radiance; give it only one of them")
         if not isinstance(material, Material | None):
-            raise checks.refuse("material", material, "a Diffuse or a Phong")
+            kinds = " or ".join(f"a {kind.__name__}" for kind in MATERIALS)
+            raise checks.refuse("material", material, kinds)
         if radiance is not None:
             radiance = checks.colour("radiance", radiance, checks.RADIANCE)
-        _set(self, material=material, radiance=radiance)
+        set_fields(self, material=material, radiance=radiance)
 
 
 @dataclass(frozen=True, init=False)
@@ -178,7 +133,7 @@ class Sphere(_Surface):
         material: Material | None = None,
         radiance: Colour | None = None,
     ) -> None:
-        _set(
+        set_fields(
             self,
             center=checks.point("center", center),
             radius=checks.number("radius", radius, checks.RADIUS),
@@ -225,7 +180,7 @@ class Mesh(_Surface, Immutable):
         radiance: Colour | None = None,
     ) -> None:
         points = checks.vectors("vertices", vertices)
-        _set(
+        set_fields(
             self,
             vertices=points,
             faces=checks.indices("faces", faces, len(points)),
@@ -311,7 +266,7 @@ class Scene:
             raise checks.refuse("camera", camera, "a Camera")
         if not isinstance(description, str):
             raise checks.refuse("description", description, "a text")
-        _set(self, camera=camera, shapes=_shapes(shapes), description=description)
+        set_fields(self, camera=camera, shapes=_shapes(shapes), description=description)
 
     def resized(self, width: int | None = None, height: int | None = None) -> Scene:
         """Return the same scene with a picture of another size in pixels.
@@ -352,12 +307,6 @@ def material_from_brdf_params(brdf_params: Vector) -> Material:
     *albedo, alpha = items
     exponent = checks.number("exponent", alpha, checks.EXPONENT)
     return Diffuse(albedo) if exponent == 1 else Phong(albedo, exponent)
-
-
-def _set(instance: object, **values: object) -> None:
-    """Fill the fields of a frozen dataclass while it is made."""
-    for name, value in values.items():
-        object.__setattr__(instance, name, value)
 
 
 def _unit_normals(normals: ArrayLike, count: int) -> NDArray[np.float64]:

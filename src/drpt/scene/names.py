@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from drpt.scene.model import Material, Scene
+    from drpt.scene.materials import Material
+    from drpt.scene.model import Scene
 
 
 @dataclass(frozen=True)

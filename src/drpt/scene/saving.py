@@ -14,13 +14,14 @@ import numpy as np
 from drpt.files import write_file
 from drpt.scene import checks
 from drpt.scene.checks import SceneError
-from drpt.scene.model import Diffuse, Material, Mesh, Scene, Shape
+from drpt.scene.model import Mesh, Scene, Shape
 from drpt.scene.names import numbered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from os import PathLike
 
+    from drpt.scene.materials import Material
     from drpt.scene.names import Names
 
 Table = dict[str, Any]
@@ -91,7 +92,7 @@ def _toml(scene: Scene, describe_mesh: Callable[[Mesh], Table], names: Names | N
 
 
 def _material(material: Material) -> Table:
-    return {"type": "diffuse" if isinstance(material, Diffuse) else "phong", **asdict(material)}
+    return {"type": material.name, **asdict(material)}
 
 
 def _geometry(shape: Shape, describe_mesh: Callable[[Mesh], Table]) -> Table:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from drpt.scene import Shape
     from drpt.scene.checks import Point
-    from drpt.scene.model import Material
+    from drpt.scene.materials import Material
 
 OF_SPHERES = ("center", "radius")
 OF_SURFACES = ("albedo", "exponent")

@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import acos, cos, pi, radians, sin, sqrt, tan
 from typing import Any
 
@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from drpt.kernel.brdf import Brdf
+from drpt.kernel.bsdfs import LOBES, Bsdf, SurfacePoint
 from drpt.kernel.device_scene import upload
-from drpt.kernel.estimator import Features
-from drpt.kernel.primitives import DIFFUSE, make_primitives
+from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SobolSampler
 from drpt.scene import Camera, Diffuse, Material, Phong, Scene, Sphere
 from tests.conftest import TYPES, to_device, to_host, unit_square
@@ -31,8 +30,8 @@ HORIZON = 1e-6  # cosines closer to 0 than this have either sign
 
 COLOUR = (0.2, 0.5, 1.0)
 EXPONENTS = [0.0, 1.0, 2.0, 50.0, 1e3, 1e5, 1e6]
-LOBES = [Phong(COLOUR, exponent) for exponent in EXPONENTS]
-MATERIALS: list[Material] = [Diffuse(COLOUR), *LOBES]
+GLOSSY = [Phong(COLOUR, exponent) for exponent in EXPONENTS]
+MATERIALS: list[Material] = [Diffuse(COLOUR), *GLOSSY]
 TILTS = [0.0, 30.0, 70.0, 89.0, 89.99]
 
 
@@ -42,19 +41,6 @@ def value_error(material: Material) -> float:
     Rounded directions, off by 6e-8, move the lobe's flank: its slope is √α / its height.
     """
     return 1e-6 + 1.5e-7 * sqrt(material.exponent if isinstance(material, Phong) else 0)
-
-
-def features(*materials: Material, interpolated_normals: bool = False) -> Features:
-    present = {field.name: False for field in fields(Features)}
-    present["diffuse"] = any(isinstance(m, Diffuse) for m in materials)
-    present["phong"] = any(isinstance(m, Phong) for m in materials)
-    return Features(**present | {"interpolated_normals": interpolated_normals})
-
-
-def make(material: Material, ng: Floats, ns: Floats, wo: Floats, has: Features) -> Brdf:
-    exponent = material.exponent if isinstance(material, Phong) else DIFFUSE
-    albedo, exponents = to_device([material.albedo]), to_device([exponent])
-    return Brdf(has, albedo, exponents, to_device(ng), to_device(ns), to_device(wo))
 
 
 @dataclass
@@ -72,9 +58,16 @@ class Case:
         return self.material, self.ng, self.ns, self.wo
 
     @property
-    def device(self) -> Brdf:
-        has = features(self.material, interpolated_normals=self.interpolated_normals)
-        return make(*self.given, has)
+    def device(self) -> Bsdf:
+        return self.among(type(self.material))
+
+    def among(self, *kinds: type[Material]) -> Bsdf:
+        """Return the BSDF in a kernel that has some kinds of materials."""
+        lobes = tuple(lobe for lobe in LOBES if lobe.material in kinds)
+        albedo, code = to_device([self.material.albedo]), to_device([self.material.code])
+        point = SurfacePoint(code, to_device(self.ns), to_device(self.wo))
+        normal = to_device(self.ng) if self.interpolated_normals else None
+        return Bsdf(lobes, albedo, code, point, normal)
 
     def candidates(self) -> Floats:
         """Return directions: half of them samples, the others all over the sphere."""
@@ -174,9 +167,7 @@ class TestValues:
         self, make_case: Callable[[Material], Case], material: Material
     ) -> None:
         case = make_case(material)
-        other = Diffuse(0.5) if isinstance(material, Phong) else Phong(0.5, 7)
-        has = features(material, other, interpolated_normals=case.interpolated_normals)
-        mixed, alone = make(*case.given, has), case.device
+        mixed, alone = case.among(Diffuse, Phong), case.device
         u, wi = unit_square(len(case.wo)), to_device(case.candidates())
         for a, b in (
             *zip(mixed.sample(u), alone.sample(u), strict=True),
@@ -251,7 +242,7 @@ def test_samples_follow_the_pdf(material: Material, degrees: float) -> None:
     assert p_value(material, degrees, material) > SIGNIFICANCE
 
 
-@pytest.mark.parametrize("material", LOBES)
+@pytest.mark.parametrize("material", GLOSSY)
 def test_chi2_detects_a_biased_width(material: Phong) -> None:
     biased = Phong(COLOUR, (material.exponent + 1) * (1 + BIAS) - 1)
     assert p_value(material, 70, biased) < SIGNIFICANCE
@@ -283,8 +274,8 @@ def test_a_row_has_the_material_of_its_primitive() -> None:
     lamp = Sphere((0, 9, 0), 1, radiance=1)
     scene = upload(make_primitives(Scene(camera, [*shapes, lamp]).shapes), TYPES)
     active = TYPES.Bool([True, True, True, False])
-    row = scene.surface_row(TYPES.UInt32([0, 1, 2, 0]), active)
+    row = scene.geometry.row(TYPES.UInt32([0, 1, 2, 0]), active)
     albedo = np.array([materials[0].albedo, materials[1].albedo, (0, 0, 0), (0, 0, 0)])
-    np.testing.assert_allclose(to_host(row.albedo), albedo, rtol=1e-7)
-    np.testing.assert_array_equal(to_host(row.exponent)[:2], [DIFFUSE, 7])
-    np.testing.assert_array_equal(np.array(row.geometry).T[2:], [(0, 9, 0, 1), (0, 0, 0, 0)])
+    np.testing.assert_allclose(to_host(row.material.xyz), albedo, rtol=1e-7)
+    np.testing.assert_array_equal(to_host(row.material.w)[:2], [m.code for m in materials])
+    np.testing.assert_array_equal(np.array(row.shape).T[2:], [(0, 9, 0, 1), (0, 0, 0, 0)])

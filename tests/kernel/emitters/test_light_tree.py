@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from drpt.kernel.light import Receiver
-from drpt.kernel.light_tree import EVEN, FEW, WIDTH, LightTree, geometric_importance, nodes_of
+from drpt.kernel.emitters import Receiver
+from drpt.kernel.emitters.light_tree import (
+    EVEN,
+    FEW,
+    WIDTH,
+    LightTree,
+    geometric_importance,
+    nodes_of,
+)
 from drpt.kernel.sphere_tree import arrange
 from tests.conftest import TYPES, to_device, to_host, unit_square
 from tests.oracle.arrays import Floats, sample_uniform_sphere

@@ -8,17 +8,9 @@ import pytest
 
 from drpt.kernel.camera import Ray
 from drpt.kernel.device_scene import DeviceScene, upload
+from drpt.kernel.emitters import Choice, LightSample, Receiver, power_heuristic
 from drpt.kernel.estimator import Features, Mode
 from drpt.kernel.intersect import closest_hit
-from drpt.kernel.light import (
-    LightSample,
-    Receiver,
-    choose_light,
-    inverse_pdf,
-    power_heuristic,
-    sample_light,
-)
-from drpt.kernel.light_tree import Choice
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SobolSampler
 from drpt.kernel.warp import square_to_sphere
@@ -78,13 +70,13 @@ class Lights:
         """Sample a light from a point of a surface."""
         at, number = Receiver(to_device([point]), to_device([normal])), TYPES.UInt32([light])
         choice = Choice(number, self.pmf(at, number))
-        return sample_light(self.scene, self.features, self.mode, at, choice, u)
+        return self.scene.emitters.sample(at, choice, u, visible=self.mode.samples_cones)
 
     def pmf(self, at: Receiver, light: Any) -> Any:
         """Return the probability of a light."""
-        if self.scene.light_tree is None:
+        if self.scene.emitters.tree is None:
             return TYPES.Float32(1)
-        return self.scene.light_tree.pmf(at, TYPES.Bool(True), light)
+        return self.scene.emitters.tree.pmf(at, TYPES.Bool(True), light)
 
     def inverse_pdf_of_hits(
         self, direction: Any, light: int = 0, normal: Any = UP
@@ -92,10 +84,10 @@ class Lights:
         """Return 1 / density of rays from a surface at the origin, and where they hit a light."""
         at = Receiver(to_device([ORIGIN]), to_device([normal]))
         ray = Ray(at.point, direction)
-        hit = closest_hit(self.scene, self.features, ray, TYPES.Bool([True]))
+        hit = closest_hit(self.scene.geometry, self.features, ray, TYPES.Bool([True]))
         number = TYPES.UInt32([light])
-        found = np.array(hit.valid & (hit.primitive == self.scene.first_light + number))
-        return to_host(inverse_pdf(self.scene, self.features, at, number, ray, hit)), found
+        found = np.array(hit.valid & (hit.primitive == self.scene.geometry.first_light + number))
+        return to_host(self.scene.emitters.inverse_pdf(at, number, ray, hit)), found
 
 
 def sobol() -> Any:
@@ -458,7 +450,7 @@ def test_of_a_single_light_asks_for_no_number() -> None:
     def refuse() -> Any:
         raise AssertionError
 
-    choice = choose_light(Lights.of(SPHERE).scene, at, TYPES.Bool(True), refuse)
+    choice = Lights.of(SPHERE).scene.emitters.choose(at, TYPES.Bool(True), refuse)
     assert (np.array(choice.light).tolist(), np.array(choice.pmf).tolist()) == ([0], [1])
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from drjit.auto import Array4f, Bool, Float, UInt32
     from numpy.typing import NDArray
 
-    from drpt.kernel.light import Receiver
+    from drpt.kernel.emitters.base import Receiver
 
     Array = NDArray[np.float64]
 
