@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from drpt.kernel.device_scene import DeviceScene
-    from drpt.kernel.path import Tracer, Vertex
+    from drpt.kernel.integrators.path import Tracer, Vertex
     from drpt.kernel.primitives import Primitives
     from drpt.scene import Shape
 
@@ -193,7 +193,7 @@ def _upload_something(primitives: Primitives, types: ModuleType) -> DeviceScene:
 
 def _light_code() -> list[AbstractContextManager[Any]]:
     """Of the first vertex only the device knows that light does not leave it."""
-    from drpt.kernel.path import Tracer
+    from drpt.kernel.integrators.path import Tracer
 
     def first_vertex(self: Tracer, ray: Any, sampler: Any, known: Any = None) -> Vertex:
         return self.arrive(self.start(ray), sampler, _opaque(self.scene.types.UInt32, 0), known)
@@ -204,8 +204,8 @@ def _light_code() -> list[AbstractContextManager[Any]]:
 def _last_ray() -> list[AbstractContextManager[Any]]:
     """A ray after the last bounce, whose hit only the device knows to give nothing."""
     from drpt.kernel.camera import Ray
+    from drpt.kernel.integrators.path import Tracer
     from drpt.kernel.intersect import light_hit
-    from drpt.kernel.path import Tracer
 
     def follow(self: Tracer, first: Vertex, sampler: Any) -> tuple[Any, Any]:
         import drjit as dr
@@ -227,7 +227,7 @@ def _last_ray() -> list[AbstractContextManager[Any]]:
 
 def _weights() -> list[AbstractContextManager[Any]]:
     """Weights of two techniques, of which only the device knows that one never finds light."""
-    from drpt.kernel import path
+    from drpt.kernel.integrators import path
     from drpt.kernel.bsdfs import Bsdf
 
     pdf, emission = Bsdf.pdf, path.Tracer._emission
@@ -292,7 +292,7 @@ def _shadow_rays() -> list[AbstractContextManager[Any]]:
     def trace(scene: Any, ray: Any, distance: Any, light: Any, _: Any) -> Any:
         return occluded(scene, ray, distance, light, scene.types.Bool(True))
 
-    return [patch("drpt.kernel.path.occluded", trace)]
+    return [patch("drpt.kernel.integrators.path.occluded", trace)]
 
 
 def _normals_of_lights() -> list[AbstractContextManager[Any]]:

@@ -173,7 +173,7 @@ class TestResuming:
     def test_what_was_not_finite_is_remembered(
         self, path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        from drpt.kernel.path import Tracer
+        from drpt.kernel.integrators.path import Tracer
 
         follow = Tracer.follow
 

@@ -156,14 +156,14 @@ def test_the_check_sees_what_is_forbidden(tmp_path: Path) -> None:
     file = tmp_path / "sample.py"
     file.write_text(
         "import drjit as dr\n"
-        "from drpt.kernel import path\n"
+        "from drpt.kernel.integrators import path\n"
         "from drpt import render\n"
         "def f():\n    import mitsuba.python\n"
         "if TYPE_CHECKING:\n    from drpt.scene import Scene\n"
     )
     assert imports(file) == [
         Import("drjit", lazy=False, typing=False),
-        Import("drpt.kernel.path", lazy=False, typing=False),
+        Import("drpt.kernel.integrators.path", lazy=False, typing=False),
         Import("drpt.render", lazy=False, typing=False),
         Import("mitsuba.python", lazy=True, typing=False),
         Import("drpt.scene", lazy=False, typing=True),
@@ -183,4 +183,4 @@ def test_the_scene_loads_no_other_part() -> None:
     code = "import sys, drpt.scene.model; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "drpt.scene.model" in done.stdout.split()
-    assert not set(done.stdout.split()) & {"drjit", "mitsuba", "drpt.kernel.path"}
+    assert not set(done.stdout.split()) & {"drjit", "mitsuba", "drpt.kernel.integrators.path"}

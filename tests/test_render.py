@@ -230,7 +230,7 @@ def test_a_render_goes_on_after_an_interrupt_amid_a_pass(monkeypatch: pytest.Mon
 
 
 def test_injected_infinities_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    from drpt.kernel.path import Tracer
+    from drpt.kernel.integrators.path import Tracer
 
     follow = Tracer.follow
 
@@ -256,7 +256,7 @@ def test_injected_infinities_are_counted(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_sample_that_is_not_finite_is_named_and_can_be_traced_again(
     sampler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from drpt.kernel.path import Tracer
+    from drpt.kernel.integrators.path import Tracer
 
     follow = Tracer.follow
 

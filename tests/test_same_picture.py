@@ -62,7 +62,7 @@ def test_plans_of_passes_change_the_last_bit_at_most(
 @pytest.mark.parametrize("mode", MODES)
 def test_bounces_in_a_loop_and_unrolled(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     plain = drpt.render(small_scene(), SPP, BOUNCES, mode)
-    monkeypatch.setattr("drpt.kernel.path.UNROLLED_VERTICES", 1)
+    monkeypatch.setattr("drpt.kernel.integrators.path.UNROLLED_VERTICES", 1)
     assert_same(drpt.render(small_scene(), SPP, BOUNCES, mode), plain)
 
 

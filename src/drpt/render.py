@@ -573,7 +573,7 @@ def explain(scene: Scene, bounces: int = 3, mode: str = Mode.MIS) -> Explanation
         launcher = rendering.launcher
         operations = launcher.operations()
     what = launcher.primitives, bounces, Mode(rendering.settings.mode)
-    worthwhile = launcher.tracer.guide is not None
+    worthwhile = launcher.tracer.features.guiding
     facts = {
         **feature_facts(*what, worthwhile=worthwhile),
         **layout_facts(*what, worthwhile=worthwhile),

@@ -15,8 +15,9 @@ import drjit as dr
 from drpt import Diffuse, Mesh, Mode, Phong, Scene, Sphere, load_scene
 from drpt.crosscheck import Estimate, measure
 from drpt.crosscheck.references import SPP
-from drpt.kernel import intersect, path
+from drpt.kernel import intersect
 from drpt.kernel.bsdfs import Bsdf
+from drpt.kernel.integrators import path
 from drpt.kernel.warp import INV_PI
 from tests.measuring import with_picture
 

@@ -62,7 +62,7 @@ def test_open_scenes_alone_regenerate_paths() -> None:
 
 
 def test_samples_that_are_not_finite_are_counted_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    from drpt.kernel.path import Tracer
+    from drpt.kernel.integrators.path import Tracer
 
     start = Tracer.start
 

@@ -18,9 +18,10 @@ from drpt.immutable import immutable
 from drpt.kernel.backend import interrupts_put_off
 from drpt.kernel.camera import make_camera, picture_plane
 from drpt.kernel.estimator import Features, Mode
+from drpt.kernel.integrators.directions import unguided
+from drpt.kernel.integrators.path import Tracer, Vertex
 from drpt.kernel.intersect import closest_hit
 from drpt.kernel.launch import Launcher, covered, prepare
-from drpt.kernel.path import Tracer, Vertex
 from drpt.kernel.recording import NONE
 from drpt.kernel.sampler import SAMPLERS
 from drpt.kernel.vec import vec3
@@ -79,16 +80,19 @@ def first_hits(
         covering = covered(scene.camera, scene.shapes, types) if features.covered_pixels else None
         camera = make_camera(scene.camera, primitives.origin, on_device.types)
         estimator = on_device, features, Mode.IMPLICIT, 0
+        directions = unguided(Mode.IMPLICIT, features)
         forward = _axis(scene.camera, on_device.types)
 
     def mean(tracer: Tracer) -> NDArray[np.float64]:
         launcher = Launcher(tracer, camera, covering, SAMPLERS[sampler], jitter, 1, primitives)
         return _mean(launcher, scene.camera, spp, seed)
 
-    far, share, _ = np.moveaxis(mean(_DepthTracer(*estimator, forward)), -1, 0)
+    far, share, _ = np.moveaxis(
+        mean(_DepthTracer(*estimator, forward, directions=directions)), -1, 0
+    )
     layers = {
-        "albedo": mean(_AlbedoTracer(*estimator)),
-        "normal": mean(_NormalTracer(*estimator)),
+        "albedo": mean(_AlbedoTracer(*estimator, directions=directions)),
+        "normal": mean(_NormalTracer(*estimator, directions=directions)),
         "depth": np.divide(far, share, out=np.full_like(far, np.inf), where=share > 0),
     }
     return {name: immutable(layer.astype(np.float32)) for name, layer in layers.items()}
@@ -118,7 +122,8 @@ def first_seen(types: ModuleType, scene: Scene) -> Seen:
         primitives, on_device = prepare(scene.shapes, types)
         features = replace(_features(primitives), covered_pixels=False)
         camera = make_camera(scene.camera, primitives.origin, on_device.types)
-        tracer = _PlaceTracer(on_device, features, Mode.IMPLICIT, 0)
+        directions = unguided(Mode.IMPLICIT, features)
+        tracer = _PlaceTracer(on_device, features, Mode.IMPLICIT, 0, directions=directions)
         sampler = SAMPLERS["independent"]
         launcher = Launcher(tracer, camera, None, sampler, False, 1, primitives)
     place = _mean(launcher, scene.camera, 1, 0)
@@ -174,7 +179,7 @@ class _FirstHitTracer(Tracer, ABC):
         hit = closest_hit(self.scene.geometry, self.features, ray, path.active, known)
         bsdf = self.bsdf(hit, -ray.direction)
         feature = dr.select(hit.valid, self._feature(ray, hit, bsdf), 0)
-        return Vertex(path._replace(radiance=feature), hit, bsdf, path.patch)
+        return Vertex(path._replace(radiance=feature), hit.valid, hit, bsdf)
 
     @abstractmethod
     def _feature(self, ray: Ray, hit: Hit, bsdf: Bsdf) -> Array3f:

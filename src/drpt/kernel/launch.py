@@ -15,11 +15,13 @@ from drpt.kernel.compiled import COMPILED
 from drpt.kernel.coverage import covering_facets
 from drpt.kernel.device_scene import DeviceScene, to_device, upload
 from drpt.kernel.estimator import Features, knows_all
-from drpt.kernel.guide_share import GuideShares, make_shares, rounded
+from drpt.kernel.guiding.directions import GuidedDirections
+from drpt.kernel.guiding.pilot import BOUNCES, Pilot, best_shares, fly
+from drpt.kernel.guiding.share import GuideShares, make_shares, rounded
+from drpt.kernel.guiding.training import learn
+from drpt.kernel.integrators.directions import unguided
+from drpt.kernel.integrators.path import Tracer
 from drpt.kernel.kept import Kept
-from drpt.kernel.learning import learn
-from drpt.kernel.path import Tracer
-from drpt.kernel.pilot import BOUNCES, Pilot, best_shares, fly
 from drpt.kernel.primitives import make_primitives
 from drpt.kernel.sampler import SAMPLERS, SobolSampler
 from drpt.kernel.schedule import Lanes, Totals, Work
@@ -31,8 +33,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.estimator import Mode
-    from drpt.kernel.guide import Guide
-    from drpt.kernel.path import Path
+    from drpt.kernel.guiding.guide import Guide
+    from drpt.kernel.integrators.path import Path
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Camera, Scene, Shape
@@ -194,8 +196,10 @@ def make_launcher(
     features = Features.of(primitives, bounces, mode, worthwhile=shares is not None)
     if not len(primitives.reflectance):
         bounces = 0
-    guide = learned(scene.shapes, types) if shares else None
-    tracer = Tracer(device_scene, features, mode, bounces, guide=guide, shares=shares)
+    directions = unguided(mode, features)
+    if shares:
+        directions = GuidedDirections(learned(scene.shapes, types), shares, bounces)
+    tracer = Tracer(device_scene, features, mode, bounces, directions=directions)
     camera = make_camera(scene.camera, primitives.origin, device_scene.types)
     paths_per_ray = PATHS_PER_RAY if share_rays and features.shared_rays else 1
     covering = covered(scene.camera, scene.shapes, types) if features.covered_pixels else None

@@ -13,15 +13,13 @@ import numpy as np
 
 from drpt.immutable import Immutable
 from drpt.kernel.arithmetic import same_bits
-from drpt.kernel.camera import Ray
-from drpt.kernel.intersect import closest_hit
 
 if TYPE_CHECKING:
     from drjit.auto import Array3f, Bool, UInt32
     from numpy.typing import NDArray
 
+    from drpt.kernel.integrators.path import Path, Tracer, Vertex
     from drpt.kernel.launch import Launcher
-    from drpt.kernel.path import Path, Tracer, Vertex
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
 
@@ -102,33 +100,28 @@ class _Recorder:
         fresh = path._replace(radiance=types.Array3f(0), rays=types.UInt32(0))
         vertex = tracer.arrive(fresh, sampler, depth)
         onward = tracer.leave(vertex, own, depth)
-        ray = Ray(path.origin, path.direction)
-        hit = closest_hit(tracer.scene.geometry, tracer.features, ray, path.active)
-        light, light_point = self._light(vertex, sampler, depth)
-        looked = vertex.path.rays > 1
-        dr.eval(
-            hit.valid, hit.primitive, hit.point, *vertex.path, looked, light, light_point, *onward
-        )
+        hit, (light, light_point, traced) = vertex.hit, self._light(vertex)
+        dr.eval(vertex.found, hit.primitive, hit.point, *vertex.path, *onward)
+        dr.eval(light, light_point, traced)
         vertices = Vertices(
             reached=np.array(path.active),
             throughput=_rows(vertex.path.beta),
             direction=_rows(path.direction),
-            shape=self._shapes(hit.primitive, hit.valid),
+            shape=self._shapes(hit.primitive, vertex.found),
             point=self.primitives.origin + _rows(hit.point),
             contribution=_rows(vertex.path.radiance),
-            light_shape=self._shapes(light, looked),
+            light_shape=self._shapes(light, traced),
             light_point=self.primitives.origin + _rows(light_point),
         )
         return vertices, onward
 
-    def _light(self, vertex: Vertex, sampler: Sampler, depth: UInt32) -> tuple[UInt32, Array3f]:
-        """The primitive and the point that a vertex looks at, if it looks at any."""
-        hit = vertex.hit
-        if not self.tracer.features.direct_light:
-            return hit.primitive, hit.point
-        light, sample = self.tracer.light_sample(hit, sampler, depth)
-        point = dr.fma(sample.direction, sample.distance, hit.point)
-        return light + self.tracer.scene.geometry.first_light, point
+    def _light(self, vertex: Vertex) -> tuple[UInt32, Array3f, Bool]:
+        """The primitive and the point that a shadow ray leads to, and whether there is one."""
+        hit, direct = vertex.hit, vertex.direct
+        if direct is None:
+            return hit.primitive, hit.point, hit.valid & False
+        point = dr.fma(direct.sample.direction, direct.sample.distance, hit.point)
+        return direct.light + self.tracer.scene.geometry.first_light, point, direct.traced
 
     def _shapes(self, primitive: UInt32, valid: Bool) -> NDArray[np.intp]:
         kept = np.array(valid)

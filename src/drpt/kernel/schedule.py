@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
+from drpt.kernel.integrators.path import Path
 from drpt.kernel.intersect import UNKNOWN, Known
-from drpt.kernel.path import Path
 from drpt.kernel.vec import types_of, vec2
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from drjit.auto import Array3f, Array3f64, UInt32
 
     from drpt.kernel.camera import DeviceCamera, Ray
-    from drpt.kernel.path import Tracer
+    from drpt.kernel.integrators.path import Tracer
     from drpt.kernel.sampler import Sampler
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.path import UNROLLED_VERTICES
+from drpt.kernel.integrators.path import UNROLLED_VERTICES
 from tests.measuring import Measured, assert_agree, measure, measure_to, with_radiance
 from tests.oracle import path_tracer
 from tests.oracle.statistics import mean_of_independent
@@ -177,6 +177,6 @@ def test_surfaces_reflect_on_both_sides(mode: str) -> None:
 def test_the_loop_continues_what_is_unrolled(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(FLOOR, LIGHT, BALL, PANEL)
     unrolled = drpt.render(scene, 16, 3, mode)
-    monkeypatch.setattr("drpt.kernel.path.UNROLLED_VERTICES", 1)
+    monkeypatch.setattr("drpt.kernel.integrators.path.UNROLLED_VERTICES", 1)
     looped = drpt.render(scene, 16, 3, mode)
     assert looped.image == pytest.approx(unrolled.image, rel=1e-4, abs=1e-5)

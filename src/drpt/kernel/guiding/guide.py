@@ -59,7 +59,7 @@ class DevicePatches:
     def __init__(
         self, patches: Patches, types: ModuleType, upload: Callable[[Array], Float]
     ) -> None:
-        self._types = types
+        self.types = types
         corner = np.column_stack([patches.corner, patches.facet])
         right = np.column_stack([patches.right, patches.area])
         up = np.pad(patches.up, ((0, 0), (0, 5)))
@@ -67,7 +67,7 @@ class DevicePatches:
 
     def spot(self, patch: UInt32, u: Array2f, active: Any = True) -> Spot:
         """Area: a point of a patch, uniform."""
-        types = self._types
+        types = self.types
         row = gather_row(self._rows, patch, 16, active)
         corner, right, up = row[:4], row[4:8], row[8:]
         point = [dr.fma(right[k], u.x, dr.fma(up[k], u.y, corner[k])) for k in range(3)]
@@ -91,7 +91,7 @@ class Guide:
         self, patches: Patches, light: Array, types: ModuleType, upload: Callable[[Array], Float]
     ) -> None:
         self.patches = patches
-        self._types = types
+        self.types = types
         self._facets, self._patches = len(patches.frames), len(patches.facet)
         there, area = patches.there, patches.area[patches.there]
         counts = share_out(_known(light, area), SLOTS)
@@ -106,7 +106,7 @@ class Guide:
 
     def patch_of(self, hit: Hit) -> UInt32:
         """The patch of a hit; 0 where that is not on a facet."""
-        types, p = self._types, hit.point
+        types, p = self.types, hit.point
         on_facet = hit.valid & (hit.primitive < self._facets)
         f = gather_row(self._frames, hit.primitive, 8, on_facet)
         column, row = (
@@ -120,7 +120,7 @@ class Guide:
         self, patch: UInt32, point: Array3f, u: Array2f, active: Bool
     ) -> tuple[Array3f, UInt32]:
         """Area: the direction from a point of a patch to one of another, and the facet there."""
-        types = self._types
+        types = self.types
         x = u.x * SLOTS
         word = dr.gather(types.UInt32, self._slots, patch * SLOTS + types.UInt32(x), active)
         goal, start, more = word & _MASK, (word >> _BITS) & _MASK, word >> (2 * _BITS)
@@ -130,7 +130,7 @@ class Guide:
 
     def density(self, patch: UInt32, goal: UInt32) -> Float:
         """Area: the density of the points that :meth:`aim` finds on another patch."""
-        return dr.gather(self._types.Float32, self._density, patch * self._patches + goal)
+        return dr.gather(self.types.Float32, self._density, patch * self._patches + goal)
 
 
 def share_out(weights: Array, count: int) -> NDArray[np.intp]:

@@ -12,8 +12,9 @@ from scipy.stats import binom
 
 import drpt
 from drpt.kernel import launch
+from drpt.kernel.guiding.directions import GuidedDirections
+from drpt.kernel.guiding.pilot import WORTHWHILE, Pilot, best_shares, expected
 from drpt.kernel.launch import make_launcher
-from drpt.kernel.pilot import WORTHWHILE, Pilot, best_shares, expected
 from tests.conftest import TYPES
 from tests.measuring import assert_agree, measure, with_picture
 from tests.random_scenes import tame_scene
@@ -21,6 +22,7 @@ from tests.random_scenes import tame_scene
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from drpt.kernel.guiding.guide import Guide
     from tests.oracle.arrays import Floats
 
 PIXELS, SAMPLES = 512, 256
@@ -97,9 +99,10 @@ def test_what_cannot_be_told_is_not_guided() -> None:
         assert best_shares(pilot, HALF, 2) is None
 
 
-def guide_of(scene: drpt.Scene, bounces: int) -> object:
+def guide_of(scene: drpt.Scene, bounces: int) -> Guide | None:
     made = make_launcher(TYPES, scene, bounces, drpt.Mode.GUIDED, "sobol", jitter=True)
-    return made.tracer.guide
+    directions = made.tracer.directions
+    return directions.guide if isinstance(directions, GuidedDirections) else None
 
 
 def test_boxes_are_guided_and_a_mirror_on_a_floor_is_not() -> None:

@@ -26,9 +26,10 @@ import numpy as np
 from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import make_camera
 from drpt.kernel.estimator import Features, Mode
-from drpt.kernel.guide_share import rounded
+from drpt.kernel.guiding.share import rounded
+from drpt.kernel.integrators.directions import unguided
+from drpt.kernel.integrators.path import Tracer
 from drpt.kernel.patches import COLUMNS
-from drpt.kernel.path import Tracer
 from drpt.kernel.sampler import SobolSampler
 from drpt.kernel.warp import cosine_hemisphere_pdf
 
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.device_scene import DeviceScene
-    from drpt.kernel.guide import Guide
-    from drpt.kernel.path import Path, Vertex
+    from drpt.kernel.guiding.guide import Guide
+    from drpt.kernel.integrators.path import Path, Vertex
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Camera
@@ -95,7 +96,8 @@ def fly(
 ) -> Pilot:
     """Trace the paths of a pilot."""
     features = Features.of(primitives, bounces, Mode.GUIDED)
-    tracer = Tracer(scene, features, Mode.GUIDED, bounces)
+    directions = unguided(Mode.GUIDED, features)
+    tracer = Tracer(scene, features, Mode.GUIDED, bounces, directions=directions)
     factor = (PIXELS / (camera.width * camera.height)) ** 0.5
     width, height = (max(1, round(factor * n)) for n in (camera.width, camera.height))
     small = make_camera(replace(camera, width=width, height=height), primitives.origin, scene.types)

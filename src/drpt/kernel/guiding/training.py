@@ -18,10 +18,11 @@ from drpt.kernel.arithmetic import same_bits
 from drpt.kernel.camera import Ray
 from drpt.kernel.device_scene import to_device
 from drpt.kernel.estimator import Features, Mode
-from drpt.kernel.guide import DevicePatches, Guide
+from drpt.kernel.guiding.guide import DevicePatches, Guide
+from drpt.kernel.integrators.directions import unguided
+from drpt.kernel.integrators.path import Tracer
 from drpt.kernel.intersect import SPAWN_OFFSET
 from drpt.kernel.patches import make_patches
-from drpt.kernel.path import Tracer
 from drpt.kernel.sampler import SobolSampler
 from drpt.kernel.vec import largest, vec3
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.device_scene import DeviceScene
-    from drpt.kernel.guide import Spot
+    from drpt.kernel.guiding.guide import Spot
     from drpt.kernel.patches import Patches
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
@@ -57,7 +58,8 @@ def learn(primitives: Primitives, scene: DeviceScene) -> Guide:
 def _exchange(primitives: Primitives, scene: DeviceScene, patches: Patches) -> NDArray[np.float64]:
     """The light that reaches each of the patches that there are from each other, (k, k)."""
     mode = Mode.EXPLICIT if primitives.diffuse.all() else Mode.MIS
-    tracer = Tracer(scene, Features.of(primitives, 1, mode), mode, 1)
+    features = Features.of(primitives, 1, mode)
+    tracer = Tracer(scene, features, mode, 1, directions=unguided(mode, features))
     there = patches.there
     on_device = DevicePatches(patches, scene.types, partial(to_device, types=scene.types))
     exchange = _Exchange(tracer, on_device, scene.types.UInt32(there.astype(np.uint32)))

@@ -12,9 +12,11 @@ import pytest
 
 import drpt
 from drpt.gallery.rendering import rel_mse
-from drpt.kernel import launch, learning
+from drpt.kernel import launch
 from drpt.kernel.device_scene import to_device as upload
-from drpt.kernel.guide import SLOTS, Guide, share_out
+from drpt.kernel.guiding import training
+from drpt.kernel.guiding.directions import GuidedDirections
+from drpt.kernel.guiding.guide import SLOTS, Guide, share_out
 from drpt.kernel.intersect import Hit
 from drpt.kernel.launch import forget, make_launcher
 from drpt.kernel.patches import COLUMNS, MOST_ROWS, Patches, make_patches
@@ -195,7 +197,7 @@ def test_wrong_knowledge_makes_noise_alone(scene: drpt.Scene, bounces: int, wron
         return np.asarray(light * kept[wrong])
 
     small = with_picture(scene, 24, 24)
-    with patch.object(learning, "_exchange", guess), always_guided():
+    with patch.object(training, "_exchange", guess), always_guided():
         guided = measure(small, 2**22, bounces, "guided")
     assert_agree(guided, measure(small, 2**22, bounces, "mis"), DETECTABLE)
 
@@ -239,10 +241,10 @@ def test_a_colour_compiles_nothing(scene: drpt.Scene) -> None:
     made = [
         make_launcher(TYPES, s, 6, drpt.Mode.GUIDED, "sobol", jitter=True) for s in (small, darker)
     ]
-    light, dim = (launcher.tracer.shares for launcher in made)
-    assert light is not None
-    assert dim is not None
-    assert (dim.table.numpy() != light.table.numpy()).any()
+    light, dim = (launcher.tracer.directions for launcher in made)
+    assert isinstance(light, GuidedDirections)
+    assert isinstance(dim, GuidedDirections)
+    assert (dim.shares.table.numpy() != light.shares.table.numpy()).any()
     first, second = map(kernel_of, made)
     assert first == second
 

@@ -10,7 +10,7 @@ import pytest
 
 import drpt
 from drpt.kernel.device_scene import to_device as upload
-from drpt.kernel.guide_share import (
+from drpt.kernel.guiding.share import (
     GREATEST,
     KNOWN,
     LEAST,

@@ -1,0 +1,1 @@
+"""Path guiding: directions towards surfaces that reflect much light."""

@@ -1,0 +1,1 @@
+"""Path tracing: the loop over the vertices of a path, and how directions are chosen."""
