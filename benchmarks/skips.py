@@ -227,8 +227,8 @@ def _last_ray() -> list[AbstractContextManager[Any]]:
 
 def _weights() -> list[AbstractContextManager[Any]]:
     """Weights of two techniques, of which only the device knows that one never finds light."""
-    from drpt.kernel.integrators import path
     from drpt.kernel.bsdfs import Bsdf
+    from drpt.kernel.integrators import path
 
     pdf, emission = Bsdf.pdf, path.Tracer._emission
 
