@@ -228,21 +228,21 @@ def _last_ray() -> list[AbstractContextManager[Any]]:
 def _weights() -> list[AbstractContextManager[Any]]:
     """Weights of two techniques, of which only the device knows that one never finds light."""
     from drpt.kernel.bsdfs import Bsdf
-    from drpt.kernel.integrators import path
+    from drpt.kernel.integrators.path import Tracer
 
-    pdf, emission = Bsdf.pdf, path.Tracer._emission
+    pdf, emission = Bsdf.pdf, Tracer._emission
 
     def no_pdf(self: Bsdf, to_light: Any) -> Any:
         return pdf(self, to_light) * _opaque(type(to_light.x), 0)
 
-    def weighted(self: Tracer, *args: Any, weighted: bool) -> Any:
-        found = emission(self, *args, weighted=weighted)
-        return found * _opaque(type(found.x), 0) if weighted else found
+    def weighted(self: Tracer, path: Any, hit: Any, depth: Any) -> Any:
+        found = emission(self, path, hit, depth)
+        return found * _opaque(type(found.x), 0) if depth.may_be_later else found
 
     return [
         *features(mis=True)(),
         patch.object(Bsdf, "pdf", no_pdf),
-        patch.object(path.Tracer, "_emission", weighted),
+        patch.object(Tracer, "_emission", weighted),
     ]
 
 
