@@ -184,7 +184,7 @@ def test_places_in_dicts_are_named(mi: Any) -> None:
         from_mitsuba(scene_dict(ball=given))
     with pytest.raises(SceneError, match=r"'ball' is an object of Mitsuba's"):
         from_mitsuba(scene_dict(ball=mi.load_dict({"type": "sphere"})))
-    metal = mi.load_dict({"type": "cube", "surface": {"type": "conductor"}})
+    metal = mi.load_dict({"type": "cube", "surface": {"type": "roughconductor"}})
     with pytest.raises(SceneError, match=r"^box: bsdf: drpt has no such surface"):
         from_mitsuba(scene_dict(box=metal))
 

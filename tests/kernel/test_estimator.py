@@ -124,7 +124,8 @@ def test_a_scene_of_everything_has_all_features() -> None:
     primitives = make_primitives((BALL, LAMP))
     names = feature_facts(primitives, 2, Mode.MIS).keys()
     everything = names - {"shared_rays", "regeneration"}
-    assert features(BALL, TRIANGLE, SMOOTH, LAMP, PANEL, mode="guided") == everything
+    mirror = drpt.Sphere((0, 3, 3), 1, material=drpt.Mirror(0.5))
+    assert features(BALL, TRIANGLE, SMOOTH, mirror, LAMP, PANEL, mode="guided") == everything
 
 
 def test_spheres_alone() -> None:

@@ -5,7 +5,7 @@ All directions point away from the surface. f is per steradian; densities are pe
 
 import numpy as np
 
-from drpt.scene import Diffuse, Material, Phong
+from drpt.scene import Diffuse, Material, Mirror, Phong
 from tests.oracle.arrays import Bools, Floats, basis, dot, normalize, sample_uniform_sphere
 
 
@@ -34,10 +34,12 @@ def evaluate(
 ) -> Floats:
     """Return f(ω_o, ω_i) n·ω_i (n, 3), n the shading normal; zero for directions that do not count.
 
-    Diffuse: f = ρ/π. Phong: f = ρ (α+1)/(2π) max(0, ω_r·ω_i)^α.
+    Diffuse: f = ρ/π. Phong: f = ρ (α+1)/(2π) max(0, ω_r·ω_i)^α. Mirror: 0; see `mirrored`.
     """
     ng, ns = turn_to_viewer(geometric_normal, shading_normal, wo)
-    if isinstance(material, Diffuse):
+    if isinstance(material, Mirror):
+        value = np.zeros(len(wi))
+    elif isinstance(material, Diffuse):
         value = np.full(len(wi), 1 / np.pi)
     else:
         assert isinstance(material, Phong)
@@ -87,6 +89,16 @@ def sample(
     phi = 2 * np.pi * rng.random(len(wo))
     local = np.stack([sin_gamma * np.cos(phi), sin_gamma * np.sin(phi), cos_gamma], axis=1)
     return np.asarray(np.einsum("nk,nkc->nc", local, basis(_mirror(ns, wo))))
+
+
+def mirrored(
+    material: Mirror, geometric_normal: Floats, shading_normal: Floats, wo: Floats
+) -> tuple[Floats, Floats]:
+    """Return the only direction ω_i (n, 3) into which a mirror reflects, and its share (n, 3)."""
+    ng, ns = turn_to_viewer(geometric_normal, shading_normal, wo)
+    wi = _mirror(ns, wo)
+    counts = _counts(ng, ns, wo, wi).astype(np.float64)
+    return wi, counts[:, None] * np.asarray(material.albedo, np.float64)
 
 
 def _lobe(exponent: float, cos_gamma: Floats) -> Floats:

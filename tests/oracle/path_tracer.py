@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drpt.scene import Camera, Material, Mesh, Scene, Sphere
+from drpt.scene import Camera, Material, Mesh, Mirror, Scene, Sphere
 from tests.oracle import brdf
 from tests.oracle.arrays import Bools, Floats, Ints, dot, normalize, sample_uniform_sphere
 from tests.oracle.geometry import Hits, any_hit, closest_hit
@@ -95,10 +95,11 @@ def radiance(
         wi, weight = _next_direction(scene, hits, wo, rng, sample_brdf)
         beta = beta * weight
         going = np.any(beta > 0, axis=1)
+        specular = _is_specular(scene, hits)[going]
         paths, beta, wo = paths[going], beta[going], -wi[going]
         hits = closest_hit(scene.shapes, hits.position[going], wi[going], t_min)
-        if not direct_light:
-            L[paths] += beta * _emission(scene, hits, wo)
+        counts = specular if direct_light else np.ones(len(paths), bool)
+        L[paths[counts]] += (beta * _emission(scene, hits, wo))[counts]
     return L
 
 
@@ -110,6 +111,8 @@ def _next_direction(
     density = np.full(len(wo), 1 / (4 * np.pi))
     if sample_brdf:
         for material, at in _hits_by_material(scene, hits):
+            if isinstance(material, Mirror):
+                continue
             normals = _normals(hits[at])
             wi[at] = brdf.sample(material, *normals, wo[at], rng)
             density[at] = brdf.density(material, *normals, wo[at], wi[at])
@@ -117,7 +120,16 @@ def _next_direction(
     weight = np.zeros((len(wo), 3))
     value = _reflection(scene, hits[counts], wo[counts], wi[counts])
     weight[counts] = value / density[counts, None]
+    for material, at in _hits_by_material(scene, hits):
+        if isinstance(material, Mirror):
+            wi[at], weight[at] = brdf.mirrored(material, *_normals(hits[at]), wo[at])
     return wi, weight
+
+
+def _is_specular(scene: Scene, hits: Hits) -> Bools:
+    """Return (n,) whether a ray hit a mirror, in whose direction no light is sampled."""
+    mirrors = [i for i, s in enumerate(scene.shapes) if isinstance(s.material, Mirror)]
+    return np.isin(hits.shape, mirrors)
 
 
 def _reflected_direct_light(

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from drpt.crosscheck.phong import NAME as PHONG
+from drpt.crosscheck.bsdfs import bsdf_of
+from drpt.crosscheck.spectra import rgb
 from drpt.crosscheck.variant import load_mitsuba
 from drpt.kernel.overlaps import resolve_overlaps
 from drpt.kernel.parts import make_parts, origin_of
-from drpt.scene import Phong, Sphere
+from drpt.scene import Sphere
 from drpt.scene.meshes import MeshArrays
 
 if TYPE_CHECKING:
@@ -140,7 +141,7 @@ def surface(shape: Shape) -> dict[str, Any]:
     bsdf = {"bsdf": _bsdf(shape.material)}
     if not shape.is_light:
         return bsdf
-    return {**bsdf, "emitter": {"type": "area", "radiance": _rgb(shape.radiance)}}
+    return {**bsdf, "emitter": {"type": "area", "radiance": rgb(shape.radiance)}}
 
 
 def _mesh(mi: Any, shape: Shape, arrays: MeshArrays) -> Any:
@@ -165,12 +166,5 @@ def _mesh(mi: Any, shape: Shape, arrays: MeshArrays) -> Any:
 def _bsdf(material: Material | None) -> dict[str, Any]:
     """Return a surface that reflects on both sides; black where there is no material."""
     if material is None:
-        return {"type": "diffuse", "reflectance": _rgb((0.0, 0.0, 0.0))}
-    lobe: dict[str, Any] = {"type": "diffuse"}
-    if isinstance(material, Phong):
-        lobe = {"type": PHONG, "exponent": material.exponent}
-    return {"type": "twosided", "bsdf": {**lobe, "reflectance": _rgb(material.albedo)}}
-
-
-def _rgb(colour: Any) -> dict[str, Any]:
-    return {"type": "rgb", "value": colour}
+        return {"type": "diffuse", "reflectance": rgb((0.0, 0.0, 0.0))}
+    return bsdf_of(material)

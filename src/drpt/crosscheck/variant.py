@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from drpt.crosscheck.phong import register_phong
+from drpt.crosscheck.bsdfs.phong_plugin import register_phong
 from drpt.kernel import backend
 
 if TYPE_CHECKING:

@@ -7,10 +7,11 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from drpt.crosscheck.bsdfs import counterpart
 from drpt.crosscheck.convert import surface, to_mitsuba_dict
 from drpt.crosscheck.variant import load_mitsuba
 from drpt.files import write_file
-from drpt.scene import Mesh, Phong, SceneError, checks
+from drpt.scene import Mesh, SceneError, checks
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -22,7 +23,7 @@ SPP = 64
 
 
 def to_mitsuba_xml(scene: Scene, path: str | PathLike[str], bounces: int = 3) -> None:
-    """Write a scene of diffuse surfaces as an XML file for Mitsuba's own command line.
+    """Write a scene without Phong surfaces as an XML file for Mitsuba's own command line.
 
     Its meshes go into the folder ``<stem>-meshes`` beside it, as PLY files that are named by their
     content. ``mitsuba -m scalar_rgb -D spp=256 -o picture.exr scene.xml`` then renders what
@@ -43,10 +44,9 @@ def to_mitsuba_xml(scene: Scene, path: str | PathLike[str], bounces: int = 3) ->
     if "$" in Path(path).name:
         raise SceneError("its name holds a $, which Mitsuba takes for a parameter", "", str(path))
     for index, shape in enumerate(scene.shapes):
-        if isinstance(shape.material, Phong):
-            raise SceneError(
-                "Mitsuba has no Phong surface; use Diffuse", f"shapes[{index}].material"
-            )
+        if shape.material is not None and not counterpart(shape.material).is_builtin:
+            problem = f"Mitsuba has no {shape.material.label} surface; use Diffuse"
+            raise SceneError(problem, f"shapes[{index}].material")
     mi = load_mitsuba()
     try:
         _write(mi, scene, Path(path), bounces)

@@ -71,6 +71,9 @@ class Features:
     emission
         Radiance of lights that paths run into; without ``mis``, in modes that sample lights, camera
         rays alone do.
+    delta
+        Delta lobes: in all modes, paths that leave them collect the radiance of lights that they
+        hit.
     direct_light
         Samples of lights at every vertex.
     mis
@@ -91,6 +94,7 @@ class Features:
     triangles: bool
     interpolated_normals: bool
     emission: bool
+    delta: bool
     direct_light: bool
     mis: bool
     guiding: bool
@@ -156,6 +160,7 @@ def layout_facts(
 def _shape_facts(primitives: Primitives, bounces: int) -> dict[str, Fact]:
     lit, reflecting = _lit(primitives), _reflecting(primitives, bounces)
     smooth, codes = len(primitives.smooth_corners), primitives.reflectance[:, 3]
+    surfaces = len(codes)
     kinds = {
         kind.name: _some(int(kind.has(codes).sum()), f"{kind.label} surface", *reflecting)
         for kind in MATERIALS
@@ -165,6 +170,7 @@ def _shape_facts(primitives: Primitives, bounces: int) -> dict[str, Fact]:
         "triangles": _some(len(primitives.planes), "polygon", *lit),
         "interpolated_normals": _some(smooth, "smooth triangle", *reflecting),
         **kinds,
+        "delta": _some(surfaces - _spreading(primitives), "specular surface", *reflecting),
     }
 
 
@@ -290,7 +296,7 @@ def _ray_facts(primitives: Primitives, bounces: int, mode: Mode, guiding: Fact) 
         "last_ray": _decide(
             f"mode {mode} counts the light that it runs into",
             *_reflecting(primitives, bounces),
-            _hits_count(primitives, mode, guiding),
+            _some_hits_count(primitives, mode, guiding),
         ),
     }
 
@@ -311,6 +317,7 @@ def _sampling(primitives: Primitives, bounces: int, mode: Mode) -> tuple[Need, .
     return (
         *_reflecting(primitives, bounces),
         (mode.samples_lights, f"mode {mode} samples no light"),
+        (_spreading(primitives) > 0, "all surfaces are specular"),
     )
 
 
@@ -321,6 +328,18 @@ def _hits_count(primitives: Primitives, mode: Mode, guiding: Fact) -> Need:
         return not (has_small_lamp(primitives) and primitives.diffuse.all()), otherwise
     counts = mode in (Mode.IMPLICIT_UNIFORM, Mode.IMPLICIT, Mode.MIS, Mode.GUIDED)
     return counts, f"mode {mode} counts no light that it runs into"
+
+
+def _some_hits_count(primitives: Primitives, mode: Mode, guiding: Fact) -> Need:
+    """Whether at least paths that leave specular surfaces do so."""
+    counts, otherwise = _hits_count(primitives, mode, guiding)
+    return counts or _spreading(primitives) < len(primitives.reflectance), otherwise
+
+
+def _spreading(primitives: Primitives) -> int:
+    """Number of reflecting primitives that reflect light into more than one direction."""
+    codes = primitives.reflectance[:, 3]
+    return sum(int(kind.has(codes).sum()) for kind in MATERIALS if not kind.is_delta)
 
 
 def knows_all(primitives: Primitives) -> bool:

@@ -3,7 +3,7 @@
 from drpt.scene.builtin import builtin_names
 from drpt.scene.checks import SceneError
 from drpt.scene.files import load_scene
-from drpt.scene.materials import Diffuse, Material, Phong
+from drpt.scene.materials import Diffuse, Material, Mirror, Phong
 from drpt.scene.model import (
     Camera,
     Mesh,
@@ -18,6 +18,7 @@ __all__ = [
     "Diffuse",
     "Material",
     "Mesh",
+    "Mirror",
     "Phong",
     "Scene",
     "SceneError",

@@ -68,7 +68,9 @@ def _changed(shape: Shape, edit: Mapping[str, Any]) -> Shape:
 
 def _material(material: Material, edit: Mapping[str, Any]) -> Material:
     albedo = edit.get("albedo", material.albedo)
-    exponent = edit.get("exponent", getattr(material, "exponent", None))
+    if "exponent" not in edit:
+        return replace(material, albedo=albedo)
+    exponent = edit["exponent"]
     return Diffuse(albedo) if exponent is None else Phong(albedo, exponent)
 
 

@@ -3,10 +3,11 @@
 from drpt.kernel.bsdfs.base import Lobe, SurfacePoint
 from drpt.kernel.bsdfs.bsdf import Bsdf, BsdfSample
 from drpt.kernel.bsdfs.diffuse import DiffuseLobe
+from drpt.kernel.bsdfs.mirror import MirrorLobe
 from drpt.kernel.bsdfs.phong import PhongLobe
 from drpt.kernel.bsdfs.table import Materials
 
-LOBES: tuple[Lobe, ...] = (DiffuseLobe(), PhongLobe())
+LOBES: tuple[Lobe, ...] = (DiffuseLobe(), PhongLobe(), MirrorLobe())
 """All kinds of BSDFs, in the order of the registry of materials."""
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "DiffuseLobe",
     "Lobe",
     "Materials",
+    "MirrorLobe",
     "PhongLobe",
     "SurfacePoint",
 ]

@@ -76,6 +76,11 @@ class Bsdf(NamedTuple):
         """Whether light is reflected into all directions alike."""
         return self._is([lobe.material.is_diffuse for lobe in self.lobes])
 
+    @property
+    def is_delta(self) -> Any:
+        """Whether light is reflected into a single direction."""
+        return self._is([lobe.delta for lobe in self.lobes])
+
     def _is(self, flags: list[bool]) -> Any:
         """Whether the flag of the point's kind is set."""
         if all(flags) or not any(flags):

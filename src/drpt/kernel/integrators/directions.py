@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+import drjit as dr
+
 from drpt.kernel.warp import sphere_pdf, square_to_sphere
 
 if TYPE_CHECKING:
@@ -77,13 +79,24 @@ class Unguided:
         return 1
 
 
+@dataclass
 class UniformDirections(Unguided):
-    """Directions that are uniform on the sphere."""
+    """Directions that are uniform on the sphere, but for those of ``delta`` lobes."""
+
+    delta: bool
 
     def sample(self, place: None, hit: Hit, bsdf: Bsdf, u: Array2f) -> ScatterSample:
-        """Solid angle: uniform on the sphere."""
+        """Solid angle: uniform on the sphere. Delta lobes, which that never finds, are sampled."""
         direction = square_to_sphere(u)
-        return ScatterSample(direction, bsdf.eval(direction) / sphere_pdf(), None)
+        weight = bsdf.eval(direction) / sphere_pdf()
+        if not self.delta:
+            return ScatterSample(direction, weight, None)
+        specular, is_delta = bsdf.sample(u), bsdf.is_delta
+        return ScatterSample(
+            dr.select(is_delta, specular.direction, direction),
+            dr.select(is_delta, specular.weight, weight),
+            dr.select(is_delta, specular.pdf, sphere_pdf()),
+        )
 
 
 @dataclass
@@ -100,4 +113,6 @@ class BsdfDirections(Unguided):
 
 def unguided(mode: Mode, features: Features) -> Directions:
     """The strategy of a mode, as far as no guide chooses directions."""
-    return BsdfDirections(weighs=features.mis) if mode.samples_brdf else UniformDirections()
+    if not mode.samples_brdf:
+        return UniformDirections(features.delta)
+    return BsdfDirections(weighs=features.mis or features.delta)

@@ -49,7 +49,7 @@ class Path(NamedTuple):
     active: Bool  # whether there is a next vertex
     beta: Array3f  # throughput up to it
     normal: Array3f  # shading normal where the ray starts, for MIS
-    pdf: Float  # density of BSDF samples in its direction
+    pdf: Float  # density of BSDF samples in its direction; infinite if no light sample finds it
     guide: tuple[Any, ...]  # state of the strategy that chose its direction
     radiance: Array3f  # collected so far
     rays: UInt32  # traced so far
@@ -175,12 +175,14 @@ class Tracer:
 
     def leave(self, vertex: Vertex, sampler: Sampler, number: int | UInt32) -> Path:
         """Choose the direction in which paths continue."""
-        depth, path, hit = self.depth(number), vertex.path, vertex.hit
+        depth, path, hit, bsdf = self.depth(number), vertex.path, vertex.hit, vertex.bsdf
         u = sampler.next_2d(depth.dimension(DIRECTION))
-        scatter = self.directions.sample(vertex.place, hit, vertex.bsdf, u)
+        scatter = self.directions.sample(vertex.place, hit, bsdf, u)
         beta = path.beta * scatter.weight
         active = hit.valid & depth.has_next
         active &= ~(dr.max(beta) <= 0)  # a NaN throughput stays active, so that it is counted
+        if self.features.delta and not self.counts_all_hits:
+            active &= depth.next_reflects | bsdf.is_delta
         return path._replace(
             origin=hit.point,
             direction=scatter.direction,
@@ -201,8 +203,9 @@ class Tracer:
     def _emission(self, path: Path, hit: Hit, depth: Depth) -> Array3f:
         """L_e at a hit; weighted against light samples where a BSDF sample led there."""
         first, emitters = self.scene.geometry.first_light, self.scene.emitters
-        counts = True if self.counts_hits else depth.is_first
-        lit = hit.valid & (hit.primitive >= first) & hit.front & counts
+        lit = hit.valid & (hit.primitive >= first) & hit.front
+        if not self.counts_all_hits:
+            lit &= path.pdf == dr.inf if self.features.delta else depth.is_first
         light = self.scene.types.UInt32(0)
         if emitters.count > 1:
             light = dr.select(lit, hit.primitive - first, 0)
@@ -210,7 +213,10 @@ class Tracer:
         if self.features.mis and depth.may_be_later:
             at = Receiver(path.origin, path.normal)
             inverse = emitters.inverse_pdf(at, light, path.ray, hit._replace(valid=lit))
-            radiance = radiance * power_heuristic(1 / (inverse * path.pdf))
+            weight = power_heuristic(1 / (inverse * path.pdf))
+            if self.features.delta:
+                weight = dr.select(path.pdf == dr.inf, 1, weight)
+            radiance = radiance * weight
         return dr.select(lit, radiance, 0)
 
     def _direct_light(
@@ -250,7 +256,12 @@ class Tracer:
 
     @property
     def counts_hits(self) -> bool:
-        """Whether a path that runs into a light after a bounce collects its radiance."""
+        """Whether some paths that hit a light after a bounce collect its radiance."""
+        return self.counts_all_hits or self.features.delta
+
+    @property
+    def counts_all_hits(self) -> bool:
+        """Whether all of them do; else those do that no light sample finds, after delta lobes."""
         return self.features.mis or not self.mode.samples_lights
 
     def bsdf(self, hit: Hit, to_viewer: Array3f) -> Bsdf:

@@ -123,11 +123,14 @@ export class ShapeEditor {
     if (this.root.hidden) return;
     this.#setRanges();
     for (const field of this.fields) field.refresh();
-    const { albedo, exponent, radiance } = this.shape;
+    const { albedo, exponent, material, radiance } = this.shape;
     this.lastExponent = exponent ?? this.lastExponent;
     this.material.hidden = albedo == null;
     const [diffuse, phong] = this.material.querySelectorAll("input");
-    [diffuse.checked, phong.checked] = [exponent == null, exponent != null];
+    [diffuse.checked, phong.checked] = [
+      exponent == null && material !== "mirror",
+      exponent != null,
+    ];
     this.#describe(albedo, radiance);
     this.back.disabled = !this.view.state.edits[this.chosen];
   }
