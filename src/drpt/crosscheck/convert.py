@@ -111,11 +111,8 @@ def _sensor(mi: Any, scene: Scene) -> dict[str, Any]:
 
 def _camera_to_world(camera: Camera) -> Any:
     """Return the matrix (4, 4) of Mitsuba's camera, which looks along +z and has left as +x."""
-    eye, target, up = map(np.array, (camera.eye, camera.target, camera.up))
-    forward = (target - eye) / np.linalg.norm(target - eye)
-    left = np.cross(up, forward)
-    left /= np.linalg.norm(left)
-    return np.vstack([np.column_stack([left, np.cross(forward, left), forward, eye]), [0, 0, 0, 1]])
+    right, down, forward = camera.axes()
+    return np.vstack([np.column_stack([-right, -down, forward, camera.eye]), [0, 0, 0, 1]])
 
 
 def _reach(scene: Scene) -> float:

@@ -66,11 +66,7 @@ class PicturePlane(NamedTuple):
 
 def picture_plane(camera: Camera) -> PicturePlane:
     """Return the plane of a camera's picture, in float64."""
-    eye, target, up = map(np.array, (camera.eye, camera.target, camera.up))
-    forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, up)
-    right /= np.linalg.norm(right)
-    down = np.cross(forward, right)
+    right, down, forward = camera.axes()
     pixel = 2 * tan(radians(camera.fov) / 2) / camera.height
     corner = forward - pixel / 2 * (camera.width * right + camera.height * down)
     return PicturePlane(corner, pixel * right, pixel * down)

@@ -152,8 +152,7 @@ def _features(primitives: Primitives) -> Features:
 
 def _axis(camera: Camera, types: ModuleType) -> Array3f:
     """The unit vector along which a camera looks, an input of the kernel."""
-    view = np.subtract(camera.target, camera.eye)
-    return types.Array3f(*(dr.opaque(types.Float32, x) for x in view / np.linalg.norm(view)))
+    return types.Array3f(*(dr.opaque(types.Float32, x) for x in camera.axes().forward))
 
 
 def _mean(launcher: Launcher, camera: Camera, spp: int, seed: int) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ Lengths have no unit of their own, colours are linear RGB.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -29,6 +29,14 @@ UNIT_TOLERANCE = 1e-14
 """Normals this close to unit length, some float64 roundings, are kept to the bit."""
 FAR_EXPONENT = 500
 """Squares of numbers farther from 1 than this power of 2 are near the ends of float64."""
+
+
+class CameraAxes(NamedTuple):
+    """Orthonormal vectors (3,): to the right and down in the picture, and along the view."""
+
+    right: NDArray[np.float64]
+    down: NDArray[np.float64]
+    forward: NDArray[np.float64]
 
 
 @dataclass(frozen=True, init=False)
@@ -67,6 +75,14 @@ class Camera:
             height=checks.pixels("height", height),
         )
         self._check_frame()
+
+    def axes(self) -> CameraAxes:
+        """Return the axes of the picture and of the view."""
+        eye, target, up = map(np.array, (self.eye, self.target, self.up))
+        forward = (target - eye) / np.linalg.norm(target - eye)
+        right = np.cross(forward, up)
+        right /= np.linalg.norm(right)
+        return CameraAxes(right, np.cross(forward, right), forward)
 
     def _check_frame(self) -> None:
         view, up = np.subtract(self.target, self.eye), np.array(self.up)

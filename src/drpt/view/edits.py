@@ -80,11 +80,8 @@ def moved(scene: Scene, orbit: Orbit) -> Camera:
     if orbit == Orbit():
         return camera
     eye, up = np.array(camera.eye), np.array(camera.up)
-    forward = np.subtract(camera.target, eye)
-    forward /= np.linalg.norm(forward)
     up /= np.linalg.norm(up)
-    right = np.cross(forward, up)
-    right /= np.linalg.norm(right)
+    right, _, forward = camera.axes()
     pivot = eye + forward * _depth(scene, forward)
     around = Rotation.from_rotvec(orbit.azimuth * up, degrees=True)
     over = Rotation.from_rotvec(-orbit.elevation * right, degrees=True)
