@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.facets import Facet
-    from drpt.kernel.intersect import ManySpheres
     from drpt.kernel.primitives import Primitives
+    from drpt.kernel.scene_geometry import ManySpheres
     from drpt.kernel.solids import Solid
 
     Upload = Callable[[NDArray[Any]], Any]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import drjit as dr
 
@@ -19,16 +19,15 @@ from drpt.kernel.scene_geometry import SurfaceRow
 from drpt.kernel.vec import greater, largest, types_of, vec3
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from drjit.auto import Array3f, Array4f, Bool, Float, UInt32
 
     from drpt.kernel.camera import Ray
     from drpt.kernel.estimator import Features
     from drpt.kernel.meet import Ball
-    from drpt.kernel.scene_geometry import SceneGeometry
+    from drpt.kernel.scene_geometry import ManySpheres, SceneGeometry
 
-    Visit: TypeAlias = Callable[[UInt32, Bool, Float, Float, UInt32], tuple[Float, UInt32]]
 
 SPAWN_OFFSET = 2.0**-20
 """How far off its surface a ray starts, relative to the coordinates there: 16 half ulps.
@@ -56,29 +55,6 @@ class Known(NamedTuple):
 
     facet: UInt32
     row: SurfaceRow
-
-
-class ManySpheres(Protocol):
-    """Spheres in a hierarchy; for ``afar`` see `Ball`."""
-
-    afar: bool
-
-    def walk(
-        self,
-        ray: Ray,
-        active: Bool,
-        end: Float,
-        found: UInt32,
-        visit: Visit,
-        but: UInt32 | None = None,
-    ) -> tuple[Float, UInt32]:
-        """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
-
-        ``visit(number, met, t, end, found)`` gets a sphere's number, whether and where the ray
-        meets it, and what an earlier visit has returned; the walk is over where the end is before
-        the origin. The sphere with the number ``but`` is not visited.
-        """
-        ...
 
 
 class Hit(NamedTuple):

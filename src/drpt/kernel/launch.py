@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from drpt.kernel.estimator import Mode
     from drpt.kernel.guiding.guide import Guide
-    from drpt.kernel.integrators.path import Path
+    from drpt.kernel.integrators.state import Path
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Camera, Scene, Shape

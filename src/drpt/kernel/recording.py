@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from drjit.auto import Array3f, Bool, UInt32
     from numpy.typing import NDArray
 
-    from drpt.kernel.integrators.path import Path, Tracer, Vertex
+    from drpt.kernel.integrators.path import Tracer, Vertex
+    from drpt.kernel.integrators.state import Path
     from drpt.kernel.launch import Launcher
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler

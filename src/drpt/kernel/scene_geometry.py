@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 from drpt.kernel.vec import gather_row
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import ModuleType
 
     import numpy as np
-    from drjit.auto import Array4f, Float, UInt32
+    from drjit.auto import Array4f, Bool, Float, UInt32
     from numpy.typing import NDArray
 
+    from drpt.kernel.camera import Ray
     from drpt.kernel.facets import Facet
-    from drpt.kernel.intersect import ManySpheres
     from drpt.kernel.meet import Ball
     from drpt.kernel.mesh import TriangleMesh
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.solids import Solid
+
+    Visit: TypeAlias = Callable[[UInt32, Bool, Float, Float, UInt32], tuple[Float, UInt32]]
 
 AFAR = 2.0**16
 """Distance, in radii, from which a sphere counts as far away.
@@ -32,6 +35,29 @@ NEAR = 16
 
 The power of the origin is rounded by 2⁻²⁴ of its squared distance.
 """
+
+
+class ManySpheres(Protocol):
+    """Spheres in a hierarchy; for ``afar`` see `Ball`."""
+
+    afar: bool
+
+    def walk(
+        self,
+        ray: Ray,
+        active: Bool,
+        end: Float,
+        found: UInt32,
+        visit: Visit,
+        but: UInt32 | None = None,
+    ) -> tuple[Float, UInt32]:
+        """Visit the spheres that may be met before an ``end``, which the visits may bring nearer.
+
+        ``visit(number, met, t, end, found)`` gets a sphere's number, whether and where the ray
+        meets it, and what an earlier visit has returned; the walk is over where the end is before
+        the origin. The sphere with the number ``but`` is not visited.
+        """
+        ...
 
 
 class SurfaceRow(NamedTuple):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 
-from drpt.kernel.integrators.path import Path
+from drpt.kernel.integrators.state import Path
 from drpt.kernel.intersect import UNKNOWN, Known
 from drpt.kernel.vec import types_of, vec2
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.cells import Cells
-    from drpt.kernel.intersect import Visit
+    from drpt.kernel.scene_geometry import Visit
 
     Array = NDArray[np.float64]
     Ints = NDArray[np.intp]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from drpt.kernel.camera import Ray
-    from drpt.kernel.intersect import Visit
+    from drpt.kernel.scene_geometry import Visit
 
     Array = NDArray[np.float64]
 

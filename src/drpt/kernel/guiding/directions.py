@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from drpt.kernel.guiding.guide import Guide
     from drpt.kernel.guiding.share import GuideShares
     from drpt.kernel.integrators.depth import Depth
-    from drpt.kernel.integrators.path import Path
+    from drpt.kernel.integrators.state import Path
     from drpt.kernel.intersect import Hit
 
 

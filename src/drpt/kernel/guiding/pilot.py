@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
     from drpt.kernel.device_scene import DeviceScene
     from drpt.kernel.guiding.guide import Guide
-    from drpt.kernel.integrators.path import Path, Vertex
+    from drpt.kernel.integrators.path import Vertex
+    from drpt.kernel.integrators.state import Path
     from drpt.kernel.primitives import Primitives
     from drpt.kernel.sampler import Sampler
     from drpt.scene import Camera

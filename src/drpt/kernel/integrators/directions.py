@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from drpt.kernel.bsdfs import Bsdf
     from drpt.kernel.estimator import Features, Mode
     from drpt.kernel.integrators.depth import Depth
-    from drpt.kernel.integrators.path import Path
+    from drpt.kernel.integrators.state import Path
     from drpt.kernel.intersect import Hit
 
 

@@ -26,10 +26,11 @@ import drjit as dr
 from drpt.kernel.camera import Ray
 from drpt.kernel.emitters import LightSample, Receiver, power_heuristic
 from drpt.kernel.integrators.depth import DIRECTION, LIGHT, POINT, Depth
+from drpt.kernel.integrators.state import Path
 from drpt.kernel.intersect import Hit, Known, closest_hit, light_hit, occluded
 
 if TYPE_CHECKING:
-    from drjit.auto import Array3f, Bool, Float, UInt32
+    from drjit.auto import Array3f, Bool, UInt32
 
     from drpt.kernel.bsdfs import Bsdf
     from drpt.kernel.device_scene import DeviceScene
@@ -39,25 +40,6 @@ if TYPE_CHECKING:
 
 UNROLLED_VERTICES = 4
 """Number of vertices whose code is unrolled in the kernel; a loop takes the later ones."""
-
-
-class Path(NamedTuple):
-    """A path that has reached a ray towards its next vertex."""
-
-    origin: Array3f
-    direction: Array3f
-    active: Bool  # whether there is a next vertex
-    beta: Array3f  # throughput up to it
-    normal: Array3f  # shading normal where the ray starts, for MIS
-    pdf: Float  # density of BSDF samples in its direction; infinite if no light sample finds it
-    guide: tuple[Any, ...]  # state of the strategy that chose its direction
-    radiance: Array3f  # collected so far
-    rays: UInt32  # traced so far
-
-    @property
-    def ray(self) -> Ray:
-        """The ray towards the next vertex."""
-        return Ray(self.origin, self.direction)
 
 
 class DirectLight(NamedTuple):
