@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.camera import picture_plane
 from drpt.missed import FACTOR, before_lights, missed
+from drpt.scene.picture_plane import picture_plane
 
 if TYPE_CHECKING:
     from tests.oracle.arrays import Floats

@@ -164,7 +164,7 @@ class Rendering:
         settings = self.settings
         with backend.interrupts_put_off():
             lights = self._new_launcher(0)
-            from drpt.kernel.camera import picture_plane
+            from drpt.scene.picture_plane import picture_plane
 
         camera = settings.scene.camera
         plane = picture_plane(camera)

@@ -154,7 +154,7 @@ def test_from_within_a_sphere_its_back_is_seen() -> None:
 
 def ways(camera: drpt.Camera) -> Floats:
     """From the eye through each pixel's centre, one unit ahead."""
-    from drpt.kernel.camera import picture_plane
+    from drpt.scene.picture_plane import picture_plane
 
     plane = picture_plane(camera)
     y, x = np.mgrid[: camera.height, : camera.width] + 0.5

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.camera import make_camera, picture_plane
+from drpt.kernel.camera import make_camera
+from drpt.scene.picture_plane import picture_plane
 from tests.conftest import TYPES, to_device, to_host
 from tests.oracle.arrays import normalize
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import drpt
-from drpt.kernel.camera import picture_plane
+from drpt.scene.picture_plane import picture_plane
 from drpt.view.paths import describe_paths
 
 # Of float32 points, seen as parts of a pixel.

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians, tan
 from typing import TYPE_CHECKING, NamedTuple
 
 import drjit as dr
-import numpy as np
+
+from drpt.scene.picture_plane import picture_plane
 
 if TYPE_CHECKING:
     from types import ModuleType
 
+    import numpy as np
     from drjit.auto import Array2f, Array3f, UInt32
     from numpy.typing import NDArray
 
@@ -42,34 +43,6 @@ class DeviceCamera:
         y = type(offset.x)(row) + offset.y
         through = dr.fma(self.right, x, dr.fma(self.down, y, self.corner))
         return Ray(self.eye, dr.normalize(through))
-
-
-class PicturePlane(NamedTuple):
-    """The picture at distance 1 before the eye: its top left corner and a pixel's two edges.
-
-    Vectors (3,) from the eye; a pixel (x, y) is seen along corner + x right + y down.
-    """
-
-    corner: NDArray[np.float64]
-    right: NDArray[np.float64]
-    down: NDArray[np.float64]
-
-    def project(self, ways: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where vectors (n, 3) from the eye meet the picture: (x, y) in pixels and depth, (n, 3).
-
-        ``x`` and ``y`` count from the top left corner; they are not a number behind the eye.
-        """
-        depth, x, y = np.linalg.solve(np.stack(self, axis=1), ways.T)
-        ahead = np.where(depth > 0, depth, np.nan)
-        return np.stack([x / ahead, y / ahead, depth], axis=1)
-
-
-def picture_plane(camera: Camera) -> PicturePlane:
-    """Return the plane of a camera's picture, in float64."""
-    right, down, forward = camera.axes()
-    pixel = 2 * tan(radians(camera.fov) / 2) / camera.height
-    corner = forward - pixel / 2 * (camera.width * right + camera.height * down)
-    return PicturePlane(corner, pixel * right, pixel * down)
 
 
 def make_camera(camera: Camera, origin: NDArray[np.float64], types: ModuleType) -> DeviceCamera:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.kernel.camera import picture_plane
 from drpt.kernel.facets import COPLANAR
 from drpt.kernel.intersect import UNKNOWN
+from drpt.scene.picture_plane import picture_plane
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

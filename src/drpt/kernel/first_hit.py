@@ -16,7 +16,7 @@ import numpy as np
 
 from drpt.immutable import immutable
 from drpt.kernel.backend import interrupts_put_off
-from drpt.kernel.camera import make_camera, picture_plane
+from drpt.kernel.camera import make_camera
 from drpt.kernel.estimator import Features, Mode
 from drpt.kernel.integrators.directions import unguided
 from drpt.kernel.integrators.path import Tracer, Vertex
@@ -25,6 +25,7 @@ from drpt.kernel.launch import Launcher, covered, prepare
 from drpt.kernel.recording import NONE
 from drpt.kernel.sampler import SAMPLERS
 from drpt.kernel.vec import vec3
+from drpt.scene.picture_plane import picture_plane
 
 if TYPE_CHECKING:
     from types import ModuleType

@@ -62,7 +62,7 @@ def _size(scene: Scene) -> float:
 
 
 def _project(scene: Scene, points: Array) -> Array:
-    from drpt.kernel.camera import picture_plane
+    from drpt.scene.picture_plane import picture_plane
 
     ways = points.reshape(-1, 3) - scene.camera.eye
     return picture_plane(scene.camera).project(ways)[:, :2].reshape(*points.shape[:-1], 2)
