@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    Mask = NDArray[np.bool_]
 
 DARK = 0.01
 """Added to squares of radiance, so that dark pixels do not decide about relMSE."""
@@ -85,14 +86,22 @@ def _squares(blocks: NDArray[np.float32], size: int) -> list[NDArray[np.float32]
 
 
 def estimate(
-    differences: NDArray[np.float32], image: Array, growth: float, *, independent: bool
+    differences: NDArray[np.float32],
+    image: Array,
+    growth: float,
+    *,
+    independent: bool,
+    lights: Mask | None = None,
 ) -> tuple[Array, float]:
     """Standard errors (height, width, 3) of an image of that shape, and its relMSE.
 
-    They are not a number if unknown. Parameters are those of :class:`Estimate`.
+    They are not a number if unknown. Parameters are those of :class:`Estimate` and of
+    :meth:`Estimate.standard_errors`; by default no pixel shows a light.
     """
     found = Estimate(differences, image, growth, independent)
-    return found.standard_errors, found.relative_mse
+    if lights is None:
+        lights = np.zeros(image.shape[:2], np.bool_)
+    return found.standard_errors(lights), found.relative_mse
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,19 +125,19 @@ class Estimate:
     growth: float
     independent: bool
 
-    @property
-    def standard_errors(self) -> Array:
+    def standard_errors(self, lights: Mask) -> Array:
         """Standard error of each value, (height, width, 3); not a number if unknown.
 
         Variances are averaged over pixels around that are as noisy; see :mod:`drpt.pooling`.
+        ``lights`` are the pixels (height, width) that a light touches.
         """
         if not self._levels:
             return np.full_like(self.image, np.nan)
         ratios: Array | float = self._ratio
         if not self.independent and len(self._levels) > 1:
             coarse, fine = self._levels
-            ratios = local_ratios(coarse, fine, self._ratio)[..., None]
-        return np.sqrt(pooled(self._variances(ratios), self.image))
+            ratios = local_ratios(coarse, fine, self._ratio, lights)[..., None]
+        return np.sqrt(pooled(self._variances(ratios), self.image, lights))
 
     @cached_property
     def relative_squares(self) -> Array:

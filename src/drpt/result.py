@@ -11,6 +11,7 @@ import numpy as np
 from drpt.distribution import versions
 from drpt.error import Estimate
 from drpt.immutable import Immutable, immutable
+from drpt.light_pixels import light_pixels
 from drpt.notebook import figure
 from drpt.output import write
 from drpt.scene.saving import to_toml
@@ -94,7 +95,8 @@ class Result(Immutable):
         Not a number with a single sample, where the error was turned off, and in pictures that
         an exception left amid a pass. See :mod:`drpt.error`.
         """
-        return immutable(self._estimate.standard_errors.astype(np.float32))
+        errors = self._estimate.standard_errors(light_pixels(self.scene))
+        return immutable(errors.astype(np.float32))
 
     @cached_property
     def error(self) -> float:
