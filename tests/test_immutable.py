@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from drpt.comparison import compare
 from drpt.crosscheck.compare import compare as crosscheck
 from drpt.crosscheck.estimate import Estimate
 from drpt.immutable import Immutable, immutable
+from drpt.kernel.launch import forget
 from tests.scenes import LAMP, scene_of
 
 if TYPE_CHECKING:
@@ -55,7 +57,7 @@ def arrays(value: Any) -> Iterator[NDArray[Any]]:
     """All arrays that attributes, items and keys lead to."""
     if isinstance(value, np.ndarray):
         yield value
-    elif isinstance(value, dict):
+    elif isinstance(value, Mapping):
         yield from (array for item in value.values() for array in arrays(item))
     elif isinstance(value, tuple | list):
         yield from (array for item in value for array in arrays(item))
@@ -152,6 +154,30 @@ def test_a_scene_never_gets_the_picture_of_another() -> None:
     after = drpt.render(scene_of(small, LAMP), 4).image
     assert (before != after).any()
     np.testing.assert_array_equal(drpt.render(SCENE, 4).image, before)
+
+
+@pytest.mark.parametrize("shrunk_before", [False, True])
+def test_replacing_the_content_of_an_array_object_gives_no_picture_of_another_scene(
+    *, shrunk_before: bool
+) -> None:
+    """NumPy lets anyone call ``__setstate__`` on an array, which gives it other memory."""
+    scene = pickle.loads(pickle.dumps(SCENE))
+    small = drpt.Mesh(0.3 * FLOOR.vertices, FLOOR.faces, FLOOR.normals, drpt.Diffuse(0.5))
+    expected = drpt.render(scene_of(small, LAMP), 4).image
+    forget()
+    before = drpt.render(scene, 4).image
+    vertices = scene.shapes[0].vertices
+    vertices.__setstate__((0.3 * vertices).__reduce__()[2])
+    if shrunk_before:
+        np.testing.assert_array_equal(drpt.render(scene, 4).image, expected)
+    np.testing.assert_array_equal(drpt.render(scene_of(small, LAMP), 4).image, expected)
+    np.testing.assert_array_equal(drpt.render(SCENE, 4).image, before)
+
+
+def test_the_layers_of_a_result_cannot_be_exchanged() -> None:
+    layers = drpt.render(SCENE, 4, layers=True).layers
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        layers["albedo"] = layers["normal"]  # type: ignore[index]
 
 
 def test_what_is_prepared_is_read_only() -> None:

@@ -7,7 +7,9 @@ object has a class of its own, as NumPy unpickles arrays into plain `bytes` and 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -26,12 +28,34 @@ def immutable(array: _Array) -> _Array:
     return np.ndarray(array.shape, array.dtype, _Memory(array.tobytes()))  # type: ignore[return-value]
 
 
+def with_own_arrays(value: Any) -> Any:
+    """Return an equal object whose arrays nothing else refers to; they share the memory.
+
+    The values of an immutable array cannot change, but its object can: NumPy allows setting its
+    shape and calling ``__setstate__``. Tuples and objects of `Immutable` are copied, others not.
+    """
+    if isinstance(value, tuple):
+        return tuple(map(with_own_arrays, value))
+    if not isinstance(value, Immutable):
+        return value
+    twin = object.__new__(type(value))
+    arrays = {n: v.view() for n, v in vars(value).items() if isinstance(v, np.ndarray)}
+    set_fields(twin, **{**vars(value), **arrays})
+    return twin
+
+
+def same_values(one: np.ndarray[Any, Any], other: np.ndarray[Any, Any]) -> bool:
+    """Whether two arrays without NaN are equal; at once if they have the same memory."""
+    at_once = one.__array_interface__ == other.__array_interface__
+    return at_once or np.array_equal(one, other)
+
+
 class _Memory(bytes):
     """The memory of an immutable array."""
 
 
 class Immutable:
-    """Base of frozen dataclasses whose arrays, also those in dictionaries, are immutable.
+    """Base of frozen dataclasses whose arrays and dictionaries are immutable.
 
     Copies and unpickled objects are made by calling the class with the values of the fields.
     """
@@ -41,7 +65,9 @@ class Immutable:
             object.__setattr__(self, name, _frozen(value))
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[type, dict[str, Any]]]:
-        return make, (type(self), _values(self))
+        values = _values(self).items()
+        plain = {name: dict(v) if isinstance(v, Mapping) else v for name, v in values}
+        return make, (type(self), plain)
 
 
 def make(kind: type[_Class], values: dict[str, Any]) -> _Class:
@@ -54,8 +80,8 @@ def _values(instance: Any) -> dict[str, Any]:
 
 
 def _frozen(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _frozen(item) for key, item in value.items()}
+    if isinstance(value, Mapping):
+        return MappingProxyType({key: _frozen(item) for key, item in value.items()})
     return immutable(value) if isinstance(value, np.ndarray) else value
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, TypeVarTuple
 
+from drpt.immutable import with_own_arrays
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -17,7 +19,8 @@ KEPT = 2
 class Kept(Generic[*Args, R]):
     """A function that keeps its last results, told apart by their positional arguments.
 
-    Those are the same if they are identical or equal. Unlike `functools.lru_cache` this takes no
+    Those are the same if they are identical or equal. The function gets, and a result is kept with,
+    arguments whose arrays the caller cannot reach. Unlike `functools.lru_cache` this takes no
     hash of them, which would take longer than to render what has a million shapes.
     """
 
@@ -28,10 +31,14 @@ class Kept(Generic[*Args, R]):
     def __call__(self, *args: *Args) -> R:
         """Return what was made from these arguments, or make it."""
         kept = (entry for entry in self._results if _same(entry[0], args))
-        entry = next(kept, None) or (args, self.make(*args))
+        entry = next(kept, None) or self._made(*args)
         others = [other for other in self._results if other is not entry]
         self._results = [entry, *others][:KEPT]
         return entry[1]
+
+    def _made(self, *args: *Args) -> tuple[tuple[Any, ...], R]:
+        own = with_own_arrays(args)
+        return own, self.make(*own)
 
     def forget(self) -> None:
         """Keep nothing of what there is."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from drpt.immutable import Immutable, immutable, set_fields
+from drpt.immutable import Immutable, immutable, same_values, set_fields
 from drpt.scene import checks
 from drpt.scene.checks import RGB, Colour, Point, SceneError, Vector
 from drpt.scene.materials import MATERIALS, Diffuse, Material, Phong
@@ -241,8 +241,8 @@ class Mesh(_Surface, Immutable):
             return NotImplemented
         return (
             (self.material, self.radiance) == (other.material, other.radiance)
-            and np.array_equal(self.vertices, other.vertices)
-            and np.array_equal(self.faces, other.faces)
+            and same_values(self.vertices, other.vertices)
+            and same_values(self.faces, other.faces)
             and _equal_normals(self.normals, other.normals)
         )
 
@@ -343,7 +343,7 @@ def _unit_normals(normals: ArrayLike, count: int) -> NDArray[np.float64]:
 def _equal_normals(first: NDArray[np.float64] | None, second: NDArray[np.float64] | None) -> bool:
     if first is None or second is None:
         return first is second
-    return np.array_equal(first, second)
+    return same_values(first, second)
 
 
 def _shapes(shapes: Iterable[Shape]) -> tuple[Shape, ...]:
