@@ -57,6 +57,8 @@ def test_a_brighter_light_fails(reference: Reference) -> None:
 def test_a_known_error_of_the_reference_is_allowed_for(reference: Reference) -> None:
     report = against(reference, with_radiance(lit(), 1.05), tolerance=0.06)
     assert report.verdict == Verdict.CANNOT_TELL
+    assert report.more_samples == np.inf
+    assert "times the samples" not in str(report)
 
 
 def test_mitsubas_lost_light_is_not_held_against_drpt() -> None:
@@ -67,7 +69,19 @@ def test_mitsubas_lost_light_is_not_held_against_drpt() -> None:
 
 
 def test_few_samples_cannot_tell(reference: Reference) -> None:
-    assert check(reference, Mode.IMPLICIT_UNIFORM, 64).verdict == Verdict.CANNOT_TELL
+    report = check(reference, Mode.IMPLICIT_UNIFORM, 64)
+    assert report.verdict == Verdict.CANNOT_TELL
+    assert report.more_samples > 1
+    assert f"with {report.more_samples:.2g} times the samples in both pictures" in str(report)
+
+
+def test_as_many_samples_as_a_report_asks_for_can_tell() -> None:
+    few = check(render_reference(lit(), SPP, 1), Mode.EXPLICIT_UNIFORM, SPP)
+    assert few.verdict == Verdict.CANNOT_TELL
+    spp = SPP * (1 + int(1.5 * few.more_samples))  # with a margin for what variances scatter
+    more = check(render_reference(lit(), spp, 1, seed=1), Mode.EXPLICIT_UNIFORM, spp, seed=2)
+    assert more.verdict == Verdict.AGREES
+    assert more.more_samples < 1
 
 
 def test_uniform_directions_and_sharp_lobes_cannot_tell() -> None:

@@ -33,6 +33,7 @@ TELLING = 0.01
 MIN_EVENTS = 1000
 """Samples of the rarest kind that matters: fewer do not tell how much they vary."""
 RARE = "the samples that meet sharp lobes are too few to tell how much they vary"
+FEW = "with {:.2g} times the samples in both pictures, a difference of {:g} % would show"
 UNKNOWN = "the reference does not tell its noise, so no difference can be told from it"
 
 
@@ -80,6 +81,19 @@ class Report:
         telling = test.resolved & (test.detectable <= TELLING * np.abs(test.reference))
         return Verdict.AGREES if telling.all() else Verdict.CANNOT_TELL
 
+    @property
+    def more_samples(self) -> float:
+        """How many times the samples of both pictures it takes to detect `TELLING`.
+
+        Infinite where samples do not help: in black pictures, and beyond the reference's own error.
+        """
+        test = self.comparison.of_image
+        known = self.reference.tolerance * np.abs(test.reference)
+        left = TELLING * np.abs(test.reference) - known
+        if not (left > 0).all():
+            return np.inf
+        return float(np.square((test.detectable - known) / left).max())
+
     def __str__(self) -> str:
         lines = [self._row("mean", "drpt", "reference", "difference", "std. error", "detects")]
         test = self.comparison.of_image
@@ -93,6 +107,8 @@ class Report:
             lines.append(f"  FLIP     {self.flip:.4f}")
         if not test.resolved:
             lines.append(f"  {RARE if self.reference.estimate.is_noise_known else UNKNOWN}")
+        elif self.verdict is Verdict.CANNOT_TELL and self.more_samples < np.inf:
+            lines.append(f"  {FEW.format(self.more_samples, 100 * TELLING)}")
         spp = self.comparison.image.spp
         return "\n".join([f"{self.mode}, {self.sampler}, {spp} spp: {self.verdict}", *lines])
 
