@@ -130,6 +130,8 @@ def stopped(
         "spp: median, mean": f"{np.median(spp):.0f}, {spp.mean():.0f}",
         "never": int((spp == MOST_SPP).sum()),
         "true / target": f"{np.median(true) / target:.2f}",
+        "uncertain": int(sum(r.error_uncertain for r in results)),
+        "true > 2 error": int(sum(true > 2 * np.array([r.error for r in results]))),
     }
     return row, early
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -186,7 +187,7 @@ class TestEstimate:
         return Estimate(levels, image, 1.0, independent=True)
 
     def test_many_pixels_are_certain(self) -> None:
-        found = self.of(np.random.default_rng(0).chisquare(3, (SIDE, SIDE, 3)))
+        found = self.of(0.01 * np.random.default_rng(0).chisquare(3, (SIDE, SIDE, 3)))
         assert found.bound == found.relative_mse
 
     def test_a_pixel_that_holds_half_of_the_error_is_not(self) -> None:
@@ -194,6 +195,46 @@ class TestEstimate:
         squares[3, 4] = 16**2
         found = self.of(squares)
         assert found.bound > 1.2 * found.relative_mse
+
+    def test_a_dark_pixel_beside_a_light_may_hold_more_of_the_error_than_it_seems_to(self) -> None:
+        """Rare samples alone are bright in it, as are its neighbours; without them it is black."""
+        squares, image = np.full((SIDE, SIDE, 3), 1e-4), np.ones((SIDE, SIDE, 3))
+        image[2:5, 3:6] = 10
+        squares[3, 4], image[3, 4] = 0.3**2, 0.3
+        found = self.of_pixel(squares, image)
+        own = 0.3**2 / DARK / SIDE**2
+        assert found.relative_mse < 0.3 * own
+        assert 2 * found.bound > own
+
+    def test_a_few_pixels_need_not_converge_as_fast_as_the_picture(self) -> None:
+        """All differences say that noise falls sixfold."""
+        squares = np.full((SIDE, SIDE, 3), 1e-4)
+        squares[3, 4] = 1e-4 * SIDE**2
+        image = np.full_like(squares, 2.0)
+        levels = np.stack([squares, 6 * squares]).astype(np.float32)
+        found = Estimate(levels, image, 1.0, independent=False)
+        independent = Estimate(levels, image, 1.0, independent=True)
+        assert independent.relative_mse > 3 * found.relative_mse
+        assert 2 * found.bound > independent.relative_mse
+
+    def test_the_bound_of_a_part_is_that_of_a_picture_without_noise_elsewhere(self) -> None:
+        rng = np.random.default_rng(1)
+        squares = 0.01 * rng.chisquare(3, (SIDE, SIDE, 3))
+        chosen = np.zeros((SIDE, SIDE), np.bool_)
+        chosen[:3, :2] = True
+        whole, part = self.of(squares), self.of(np.where(chosen[..., None], squares, 0))
+        assert whole.bound_in(chosen) < whole.bound
+        assert whole.bound_in(chosen) == pytest.approx(part.bound, rel=0.01)
+        assert whole.bound_in(chosen & False) == 0
+
+    def test_what_is_measured_is_certain(self) -> None:
+        squares = 0.01 * np.random.default_rng(0).chisquare(3, (SIDE, SIDE, 3))
+        plain = self.of(squares)
+        measured = np.zeros_like(squares)
+        measured[3, 4] = 5 * SIDE**2
+        found = replace(plain, measured=measured)
+        assert found.relative_mse == pytest.approx(plain.relative_mse + 5)
+        assert found.bound == found.relative_mse
 
     def test_a_bright_pixel_among_dark_ones_counts_relative_to_itself(self) -> None:
         """Differences for a pixel of value 10 and variance 1 whose neighbours are black."""

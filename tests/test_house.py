@@ -28,7 +28,7 @@ KNOWS: dict[str, set[str]] = {
     "light_pixels": {"scene"},
     "pooling": set(),
     "error": {"convergence", "pooling"},
-    "missed": {"error", "scene"},
+    "missed": {"error"},
     "output": {"files", "machine", "messages"},
     "plan": set(),
     "denoise": {"distribution"},

@@ -1,15 +1,16 @@
-"""Light that is seen directly, but that a picture has missed."""
+"""The error of directly visible light, measured."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import drpt
-from drpt.missed import FACTOR, before_lights, missed
-from drpt.scene.picture_plane import picture_plane
+from drpt.error import DARK, Estimate, squared_differences
+from drpt.missed import Emission, measured
 
 if TYPE_CHECKING:
     from tests.oracle.arrays import Floats
@@ -21,65 +22,117 @@ LAMP = drpt.Sphere((PIXEL / 2, PIXEL / 2, 0), 0.1 * PIXEL, radiance=100)
 LAMP_PIXEL = SIDE // 2 - 1, SIDE // 2
 
 
-def project(points: Floats) -> Floats:
-    return picture_plane(CAMERA).project(points - np.asarray(CAMERA.eye))
+def noise_of(shape: tuple[int, ...], *, seed: int = 0) -> Floats:
+    return np.random.default_rng(seed).normal(size=shape)
 
 
-def test_a_lamp_is_found_in_its_pixel() -> None:
-    mask = before_lights(drpt.Scene(CAMERA, [LAMP]), project)
-    assert np.argwhere(mask).tolist() == [list(LAMP_PIXEL)]
+def estimate_of(blocks: Floats) -> Estimate:
+    """Estimate from the values (runs, pixels, 3) of a picture that has one sample in each run."""
+    image = blocks.mean(axis=0).reshape(SIDE, SIDE, 3)
+    levels = squared_differences(blocks.astype(np.float32), 1).reshape(-1, SIDE, SIDE, 3)
+    return Estimate(levels, image, 1.0, independent=True)
 
 
-def test_a_triangle_is_found_where_it_is() -> None:
-    corners = np.array([[0.1, 0.1, 0], [2.9, 0.1, 0], [0.1, 1.9, 0]]) * PIXEL
-    light = drpt.Mesh(corners, [[0, 1, 2]], radiance=1)
-    mask = before_lights(drpt.Scene(CAMERA, [light]), project)
-    assert np.argwhere(mask).tolist() == [[y, x] for y in (6, 7) for x in (8, 9, 10)]
+def light_of(emission: Floats, seen: float, factor: float = 1e9) -> Emission:
+    """Emission (runs, 3) that the picture has found in its pixel `NUMBER`."""
+    pixels, found = np.array([NUMBER]), emission.mean(axis=0)[None]
+    return Emission(pixels, emission[:, None], found, np.full((1, 3), seen), factor)
 
 
-def test_a_light_around_the_eye_may_be_anywhere() -> None:
-    light = drpt.Sphere((0, 0, 10), 1, radiance=1)
-    assert before_lights(drpt.Scene(CAMERA, [light]), project).all()
+NUMBER = LAMP_PIXEL[0] * SIDE + LAMP_PIXEL[1]
+RUNS = 4
 
 
-def test_a_light_out_of_view_is_nowhere() -> None:
-    light = drpt.Sphere((-50, 50, 0), 1, radiance=1)
-    assert not before_lights(drpt.Scene(CAMERA, [light]), project).any()
-
-
-@pytest.mark.parametrize(("value", "lacking"), [(0.0, 3.0), (1.5, 1.5), (3.0, 0.0), (9.0, 0.0)])
+@pytest.mark.parametrize("found", [0.0, 1.5, 3.0, 9.0])
 @pytest.mark.parametrize("elsewhere", [0.0, 2.0])
-@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
-def test_what_is_lacking_counts_relative_to_what_there_is(
-    value: float, lacking: float, elsewhere: float, share: float
-) -> None:
-    """Emission is 3, of which a picture has found less, or more, and light from elsewhere.
-
-    Its estimated error tells a share of it.
-    """
-    asked = []
-
-    def seen(pixels: range, rays: int) -> Floats:
-        asked.append((pixels, rays))
-        return np.full((len(pixels), 3), 3.0)
-
-    image = np.zeros((SIDE, SIDE, 3))
-    image[LAMP_PIXEL] = value + elsewhere
-    scene = drpt.Scene(CAMERA, [LAMP])
-    truth = value + elsewhere + lacking
-    expected = lacking**2 / (truth**2 + 0.01)
-    told = np.full_like(image, expected * share)
-    relative = missed(scene, image, told, 4096, project, seen, lambda _: np.full((1, 3), value))
-    assert relative == pytest.approx((1 - share) * expected / SIDE**2)
-    pixel = LAMP_PIXEL[0] * SIDE + LAMP_PIXEL[1]
-    assert asked == [(range(pixel, pixel + 1), FACTOR * 4096)]
+def test_the_error_of_emission_is_that_of_the_picture(found: float, elsewhere: float) -> None:
+    """Emission is 3, of which a picture has found less, or more, in one run; no other noise."""
+    emission = np.zeros((RUNS, 3))
+    emission[2] = RUNS * found
+    blocks = np.zeros((RUNS, SIDE**2, 3))
+    blocks[:, NUMBER] = emission + elsewhere
+    estimate = measured(estimate_of(blocks), blocks, 1, light_of(emission, 3.0))
+    true = (found - 3) ** 2 / ((3 + elsewhere) ** 2 + DARK) / SIDE**2
+    assert estimate.relative_mse == pytest.approx(true, rel=1e-6, abs=1e-11)
+    assert estimate.bound == pytest.approx(estimate.relative_mse)
 
 
-def test_a_render_does_not_stop_before_it_has_seen_the_lamp() -> None:
+def test_noise_that_is_not_of_emission_is_estimated_as_before() -> None:
+    blocks = 5 + noise_of((RUNS, SIDE**2, 3))
+    plain = estimate_of(blocks)
+    emission = np.zeros((RUNS, 3))
+    emission[2] = 4 * RUNS
+    blocks = blocks.copy()
+    blocks[:, NUMBER] += emission
+    found = measured(estimate_of(blocks), blocks, 1, light_of(emission, 4.0))
+    assert found.image[LAMP_PIXEL] == pytest.approx(plain.image[LAMP_PIXEL] + 4, rel=1e-6)
+    others = np.arange(SIDE**2) != NUMBER
+    # The pixel's neighbours are weighted by its brightness, too.
+    there = np.abs(np.argwhere(others.reshape(SIDE, SIDE)) - LAMP_PIXEL).max(axis=1) > 2
+    same = [e.relative_squares.reshape(-1, 3)[others][there] for e in (plain, found)]
+    assert same[1] == pytest.approx(same[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("factor", [1.0, 4.0, 64.0])
+def test_additional_rays_with_noise_of_their_own_tell_the_mean_squared_error(factor: float) -> None:
+    """Emission of mean 8 and variance 1 in a run, of 2000 pictures."""
+    expected, estimated = [], []
+    rng = np.random.default_rng(1)
+    for _ in range(2000):
+        emission = 8 + rng.normal(size=(RUNS, 3))
+        blocks = np.zeros((RUNS, SIDE**2, 3))
+        blocks[:, NUMBER] = emission
+        seen = 8 + rng.normal(size=3) / np.sqrt(RUNS * factor)
+        light = replace(light_of(emission, 0.0, factor), seen=seen[None])
+        found = measured(estimate_of(blocks), blocks, 1, light)
+        estimated.append(np.mean(found.measured[LAMP_PIXEL]))  # type: ignore[index]
+        expected.append(np.mean((emission.mean(axis=0) - 8) ** 2) / (64 + DARK))
+    assert np.mean(estimated) == pytest.approx(np.mean(expected), rel=0.1)
+
+
+def test_the_emission_of_a_picture_is_told_apart_from_what_it_reflects() -> None:
+    """Without bounces it is all that a picture has."""
+    for sampler in ("sobol", "independent"):
+        passes = drpt.Rendering(drpt.Scene(CAMERA, [LAMP]), 1000, 0, sampler=sampler)
+        for spp in passes.passes(2**16):
+            blocks, size = passes._film.leading_blocks, passes._film.size
+            light = passes._emission(len(blocks), size)
+            assert light.pixels.tolist() == [NUMBER]
+            assert light.blocks == pytest.approx(blocks[:, light.pixels], rel=1e-6, abs=1e-9)
+            mean = passes.result().image[LAMP_PIXEL]
+            assert light.found[0] == pytest.approx(mean, rel=1e-6), (sampler, spp)
+
+
+@pytest.mark.parametrize("spp", [64, 100, 4096])
+def test_paths_that_share_a_camera_ray_count_its_emission_each(spp: int) -> None:
+    """The lamp lights a plate behind it; emission is bright, and what the plate reflects is not."""
+    plate = drpt.Mesh(
+        [(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)],
+        [[0, 1, 2], [0, 2, 3]],
+        material=drpt.Diffuse(0.5),
+    )
+    lamp = drpt.Sphere(LAMP.center, LAMP.radius, radiance=1e4)
+    passes = drpt.Rendering(drpt.Scene(CAMERA, [plate, lamp]), spp, 1)
+    for _ in passes.passes():
+        pass
+    blocks, size = passes._film.leading_blocks, passes._film.size
+    light = passes._emission(len(blocks), size)
+    rest = (blocks[:, light.pixels] - light.blocks) / size
+    assert light.found.max() > 100
+    assert (rest > 0).all()
+    assert rest.max() < 20
+
+
+def test_the_error_of_a_lamp_that_is_hardly_hit_is_known() -> None:
     """It covers a thousandth of one pixel; all else is black, without noise."""
     lamp = drpt.Sphere(LAMP.center, 0.018 * PIXEL, radiance=1000)
-    result = drpt.render(drpt.Scene(CAMERA, [lamp]), 512, 0, seed=1, target_error=1e-4)
-    assert result.spp == 512
-    assert result.error_uncertain
-    assert "error uncertain" in str(result)
-    assert result.metadata["error_uncertain"] is True
+    scene = drpt.Scene(CAMERA, [lamp])
+    truth = float(drpt.render(scene, 2**17, 0, seed=2**40).image[LAMP_PIXEL][0])
+    for seed in range(8):
+        result = drpt.render(scene, 512, 0, seed=seed, target_error=1e-9)
+        assert result.spp == 512
+        found = result.image[LAMP_PIXEL][0]
+        true = (found - truth) ** 2 / (truth**2 + DARK) / SIDE**2
+        noise = 0.05 / SIDE**2  # relative, of what is seen, or twice that of the difference
+        assert result.error == pytest.approx(true, rel=0.3, abs=noise)
+        assert not result.error_uncertain

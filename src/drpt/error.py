@@ -118,12 +118,16 @@ class Estimate:
         How many samples there are for one of those that the differences are of.
     independent
         Whether samples are independent; else they are Sobol' points.
+    measured
+        Squared errors that are known besides, relative to the image, (height, width, 3) or 0; see
+        :func:`drpt.missed.measured`.
     """
 
     differences: NDArray[np.float32]
     image: Array
     growth: float
     independent: bool
+    measured: Array | float = 0.0
 
     def standard_errors(self, lights: Mask) -> Array:
         """Standard error of each value, (height, width, 3); not a number if unknown.
@@ -147,23 +151,43 @@ class Estimate:
         """
         if not self._levels:
             return np.full_like(self.image, np.nan)
-        return self._variances(self._ratio) * self._weights
+        return self._variances(self._ratio) * self._weights + self.measured
 
     @property
     def relative_mse(self) -> float:
         """Estimated relMSE of the image; not a number if unknown."""
         return float(np.mean(self.relative_squares))
 
-    @cached_property
+    @property
     def bound(self) -> float:
         """Half of the relMSE that the image does not exceed, but for a few in a hundred pictures.
 
         It is no less than `relative_mse`, and larger where few pixels hold most of the error: then
         they may have been estimated too low, and what is left of their noise is not averaged out.
         """
-        shares = self.relative_squares.mean(axis=2) / self.relative_squares[..., 0].size
+        return self.bound_in(np.ones(self.image.shape[:2], np.bool_))
+
+    def bound_in(self, chosen: NDArray[np.bool_]) -> float:
+        """Bound for the image, were there no error but in the pixels chosen (height, width)."""
+        if not self._levels:
+            return np.nan
+        mean = float(np.sum(self.relative_squares[chosen])) / self.image.size
+        shares = self._largest_squares[chosen].mean(axis=1) / chosen.size
         scatter = DEVIATIONS * np.sqrt(SCATTER * np.sum(np.square(shares)))
-        return float(max(self.relative_mse, (self.relative_mse + scatter) / 2))
+        return float(max(mean, (mean + scatter) / 2))
+
+    @cached_property
+    def _largest_squares(self) -> Array:
+        """Variance of each value by its square, both as bad as its own samples allow for.
+
+        A few pixels need not have the picture's ρ, but samples are no worse than independent ones.
+        The square of a value x of variance v is x² − v on average. A pixel beside a light may be
+        dark, but for rare samples: neither its neighbours nor those samples tell how dark.
+        """
+        variances = self._variances(INDEPENDENT)
+        with np.errstate(invalid="ignore"):  # of what is not finite, the weight is not a number
+            least = np.maximum(np.square(self.image) - variances, 0)
+        return variances * np.maximum(self._weights, 1 / (least + DARK))
 
     @cached_property
     def _levels(self) -> list[Array]:

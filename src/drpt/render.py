@@ -16,14 +16,15 @@ import numpy as np
 from drpt.black import black_because
 from drpt.checkpoint import Checkpoint, CheckpointError
 from drpt.distribution import versions
-from drpt.error import squared_differences
+from drpt.error import Estimate, squared_differences
 from drpt.files import check_file
 from drpt.film import Film
 from drpt.immutable import immutable
 from drpt.kernel import backend
 from drpt.kernel.estimator import SHARING_SPP, Mode, feature_facts, layout_facts
+from drpt.light_pixels import light_pixels
 from drpt.machine import require_memory
-from drpt.missed import missed
+from drpt.missed import Emission, measured, rays_for, runs
 from drpt.plan import parts, plan_passes, run_length
 from drpt.progress import with_bar
 from drpt.result import SAMPLES, Result
@@ -105,6 +106,7 @@ class Rendering:
         self._first_non_finite: tuple[int, int, int] | None = None
         self._seconds = 0.0
         self._enough = False
+        self._measured: tuple[int, Estimate] | None = None  # after how many samples
         interval = check_positive("checkpoint_interval", checkpoint_interval)
         self._checkpoint = None if checkpoint is None else self._resume(checkpoint, interval)
 
@@ -146,6 +148,8 @@ class Rendering:
                 break
             self._run(launcher, samples)
             self._enough = self._stopping.has_come(self.spp, self._stopping_error)
+            if self._stopping.has_target and self.spp == settings.spp:
+                self._measure_light()
             self._seconds += perf_counter() - start
             if self._checkpoint and self._checkpoint.is_due():
                 self._save()
@@ -153,37 +157,50 @@ class Rendering:
             start = perf_counter()
 
     def _stopping_error(self) -> float:
-        """Error for the stopping rule; missed light is searched once the bound is small enough."""
-        result = self.result()
-        if not self._stopping.is_enough(result.error_bound):
-            return result.error_bound
-        return result.error_bound + self._missed_light(result)
+        """Error for the stopping rule; light is measured once the rest may be small enough."""
+        rest = self.result().error_estimate.bound_in(~self._light_pixels)
+        return self._measure_light().bound if self._stopping.is_enough(rest) else rest
 
-    def _missed_light(self, result: Result) -> float:
-        """RelMSE of directly visible light that the samples have missed."""
-        settings = self.settings
-        with backend.interrupts_put_off():
-            lights = self._new_launcher(0)
-            from drpt.scene.picture_plane import picture_plane
+    def _measure_light(self) -> Estimate:
+        """Have the error of directly visible light measured, once after so many samples."""
+        if self._measured is None or self._measured[0] != self.spp:
+            self._measured = self.spp, self._measure(self.result().error_estimate)
+        return self._measured[1]
 
-        camera = settings.scene.camera
-        plane = picture_plane(camera)
-        own = max(1, self.spp // self.launcher.paths_per_ray) * lights.paths_per_ray
+    @cached_property
+    def _light_pixels(self) -> NDArray[np.bool_]:
+        """Whether each pixel (height, width) may show a light."""
+        return light_pixels(self.settings.scene)
 
-        def emission(pixels: range, samples: int, seed: int) -> NDArray[np.float64]:
+    def _measure(self, estimate: Estimate) -> Estimate:
+        """Estimate the error anew, in which that of directly visible light is measured."""
+        blocks, size = self._film.leading_blocks, self._film.size
+        return measured(estimate, blocks, size, self._emission(len(blocks), size))
+
+    def _emission(self, count: int, size: int) -> Emission:
+        """Directly visible light, also in the first ``count`` runs of ``size`` samples."""
+        seed, lights = self.settings.seed, self._lights
+        pixels = np.flatnonzero(self._light_pixels)
+        rays = rays_for(len(pixels), self.settings.pixels, self.spp)
+        shared = self.launcher.paths_per_ray // lights.paths_per_ray
+        own, of_block = -(-self.spp // shared), size // shared
+        blocks, found, seen = [], [], []
+        for part in runs(pixels):
             with backend.interrupts_put_off():
-                run = run_length(len(pixels), range(samples), lights.paths_per_ray)
-                sums = lights.launch(pixels, range(samples), run, seed)
-            return np.asarray(sums.radiance.sum(axis=0) / samples)
-
-        return missed(
-            settings.scene,
-            result.image.astype(np.float64),
-            result.relative_squares,
-            self.spp,
-            lambda points: plane.project(points - np.asarray(camera.eye)),
-            lambda pixels, rays: emission(pixels, rays, settings.seed + OTHER_SEED),
-            lambda pixels: emission(pixels, own, settings.seed),
+                run = min(run_length(len(part), range(own), lights.paths_per_ray), of_block)
+                sums = lights.launch(part, range(own), run, seed).radiance
+                found.append(sums.sum(axis=0) / own)
+                whole = sums[: count * of_block // run] * shared
+                blocks.append(whole.reshape(count, -1, len(part), 3).sum(axis=1))
+                run = run_length(len(part), range(rays), lights.paths_per_ray)
+                sums = lights.launch(part, range(rays), run, seed + OTHER_SEED).radiance
+                seen.append(sums.sum(axis=0) / rays)
+        return Emission(
+            pixels,
+            np.concatenate([np.zeros((count, 0, 3)), *blocks], axis=1),
+            np.concatenate([np.zeros((0, 3)), *found]),
+            np.concatenate([np.zeros((0, 3)), *seen]),
+            rays / self.spp,
         )
 
     def _run(self, launcher: Launcher, samples: range) -> None:
@@ -257,6 +274,12 @@ class Rendering:
         """The scene on the device, and what it is rendered by."""
         return self._new_launcher(self.settings.bounces)
 
+    @cached_property
+    def _lights(self) -> Launcher:
+        """Likewise for light that is seen directly."""
+        with backend.interrupts_put_off():
+            return self._new_launcher(0)
+
     def _new_launcher(self, bounces: int) -> Launcher:
         types = backend.load()  # before Dr.Jit is imported, which the kernels do
         from drpt.kernel.launch import make_launcher
@@ -285,7 +308,8 @@ class Rendering:
         shape = camera.height, camera.width, 3
         blocks = film.leading_blocks
         settings: dict[str, Any] = {**vars(self.settings), "spp": self.spp}
-        result = Result(
+        looked, measured = self._measured or (0, None)
+        return Result(
             image=film.mean.astype(np.float32).reshape(shape),
             **settings,
             partial=self.spp < self.settings.spp and not self._enough,
@@ -297,11 +321,8 @@ class Rendering:
             layers={SAMPLES: np.broadcast_to(immutable(np.array(self.spp, np.float32)), shape[:2])},
             _differences=squared_differences(blocks, film.size).reshape(-1, *shape),
             _growth=film.samples / (len(blocks) * film.size) if len(blocks) else 1.0,
+            _measured=measured if looked == self.spp else None,
         )
-        looked, error = self._stopping.last_look or (0, 0.0)
-        if looked != self.spp or not error > result.error_bound:
-            return result
-        return replace(result, _missed=error - result.error_bound)
 
     def first_hits(self) -> dict[str, NDArray[np.float32]]:
         """Layers ``albedo``, ``normal`` and ``depth`` of what the camera sees first.

@@ -81,7 +81,7 @@ class Result(Immutable):
     denoised: bool = False
     _differences: NDArray[np.float32] | None = None
     _growth: float = 1.0
-    _missed: float = 0.0
+    _measured: Estimate | None = None
 
     @property
     def paths(self) -> int:
@@ -100,32 +100,39 @@ class Result(Immutable):
 
     @cached_property
     def error(self) -> float:
-        """Estimated relMSE of the image, mean (x − truth)² / (truth² + 0.01)."""
-        return self._estimate.relative_mse
+        """Estimated relMSE of the image, mean (x − truth)² / (truth² + 0.01).
+
+        Where a ``target_error`` was set, the part that is due to directly visible lights may have
+        been measured by additional camera rays; see :mod:`drpt.missed`.
+        """
+        return self.error_estimate.relative_mse
 
     @cached_property
     def error_bound(self) -> float:
         """Half of a relMSE that the image is unlikely to exceed; ``target_error`` compares it.
 
-        It equals ``error`` if the error is spread over many pixels.
+        It equals ``error`` if the error is measured, or spread over many pixels.
         """
-        return self._estimate.bound + self._missed
+        return self.error_estimate.bound
 
     @property
     def relative_squares(self) -> NDArray[np.float64]:
         """Estimated squared error of each value, relative to it; ``error`` is their mean."""
-        return self._estimate.relative_squares
+        return self.error_estimate.relative_squares
 
     @property
     def error_uncertain(self) -> bool:
-        """Whether the true relMSE may exceed twice ``error``.
-
-        Either a few pixels have most of the error, or samples have missed directly visible light.
-        """
+        """Whether the true relMSE may exceed twice ``error``, as a few pixels have most of it."""
         return bool(self.error_bound > self.error)
+
+    @property
+    def error_estimate(self) -> Estimate:
+        """The best estimate of the error."""
+        return self._measured or self._estimate
 
     @cached_property
     def _estimate(self) -> Estimate:
+        """That from the samples of the image alone."""
         differences = self.image[None][:0] if self._differences is None else self._differences
         image = self.image.astype(np.float64)
         return Estimate(differences, image, self._growth, self.sampler == "independent")
@@ -139,7 +146,7 @@ class Result(Immutable):
         from drpt.denoise import denoise
 
         image = denoise(self.image, self.layers.get("albedo"), self.layers.get("normal"))
-        return replace(self, image=image, denoised=True, _differences=None)
+        return replace(self, image=image, denoised=True, _differences=None, _measured=None)
 
     @property
     def metadata(self) -> dict[str, str | int | float]:

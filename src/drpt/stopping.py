@@ -45,6 +45,11 @@ class Stopping:
         """Whether there is anything that stops it."""
         return self._target is not None or self._limit is not None
 
+    @property
+    def has_target(self) -> bool:
+        """Whether an error stops it."""
+        return self._target is not None
+
     def start(self) -> None:
         """Begin to count the time."""
         self._start = perf_counter()
@@ -55,8 +60,6 @@ class Stopping:
             return True
         if self._target is None or spp < self._next_look(self._target):
             return False
-        if self.last_look and self.last_look[0] == spp:  # of a render that was resumed
-            return self.is_enough(self.last_look[1])
         self.last_look = spp, error()
         return self.is_enough(self.last_look[1])
 

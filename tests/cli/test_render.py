@@ -154,7 +154,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
     machine = SimpleNamespace(name="llvm", llvm_version="22", vector_width=8)
     monkeypatch.setattr(render, "Rendering", fake.rendering)
     monkeypatch.setattr(drpt.Rendering, "launcher", fake)
-    monkeypatch.setattr(drpt.Rendering, "_missed_light", lambda _, result: 0.0)
+    monkeypatch.setattr(drpt.Rendering, "_measure", lambda _, estimate: estimate)
     monkeypatch.setattr(drpt.Rendering, "_digest", lambda _: "that of the launcher")
     monkeypatch.setattr(backend, "load", lambda: None)
     monkeypatch.setattr(backend, "describe", lambda: machine)
