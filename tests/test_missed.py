@@ -136,3 +136,16 @@ def test_the_error_of_a_lamp_that_is_hardly_hit_is_known() -> None:
         noise = 0.05 / SIDE**2  # relative, of what is seen, or twice that of the difference
         assert result.error == pytest.approx(true, rel=0.3, abs=noise)
         assert not result.error_uncertain
+
+
+@pytest.mark.parametrize("spp", [1, 2, 3, 17, 100])
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+@pytest.mark.parametrize("radiance", [1.0, 1e15])
+def test_it_is_measured_after_any_number_of_samples(
+    spp: int, sampler: str, radiance: float
+) -> None:
+    lamp = drpt.Sphere(LAMP.center, PIXEL, radiance=radiance)
+    scene = drpt.Scene(CAMERA, [lamp])
+    result = drpt.render(scene, spp, 0, sampler=sampler, target_error=1e-30)
+    assert np.isnan(result.error) == (spp == 1)
+    assert not result.error > 1e3

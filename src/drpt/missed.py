@@ -77,17 +77,18 @@ def measured(
         Directly visible light.
     """
     chosen, shape = light.pixels, estimate.image.shape
-    error = light.found - light.seen
     image = estimate.image.reshape(-1, 3).copy()
-    image[chosen] -= error
     differences = estimate.differences.reshape(len(estimate.differences), -1, 3).copy()
-    reflected = (blocks[:, chosen] - light.blocks).astype(np.float32)
-    differences[:, chosen] = squared_differences(reflected, size)
-    coarse = squared_differences(light.blocks.astype(np.float32), size)[0]
     trust = light.factor / (light.factor + 1)
     squares = np.zeros_like(image)
-    squares[chosen] = trust**2 * error**2 + (1 - trust) * coarse
-    squares /= image**2 + DARK
+    with np.errstate(invalid="ignore", over="ignore"):  # such errors are not a number, or infinite
+        error = light.found - light.seen
+        image[chosen] -= error
+        reflected = (blocks[:, chosen] - light.blocks).astype(np.float32)
+        differences[:, chosen] = squared_differences(reflected, size)
+        coarse = squared_differences(light.blocks.astype(np.float32), size)[0]
+        squares[chosen] = trust**2 * error**2 + (1 - trust) * coarse
+        squares /= image**2 + DARK
     return Estimate(
         differences.reshape(-1, *shape),
         image.reshape(shape),

@@ -175,6 +175,8 @@ class Rendering:
     def _measure(self, estimate: Estimate) -> Estimate:
         """Estimate the error anew, in which that of directly visible light is measured."""
         blocks, size = self._film.leading_blocks, self._film.size
+        if not len(blocks):  # a single sample has no error
+            return estimate
         return measured(estimate, blocks, size, self._emission(len(blocks), size))
 
     def _emission(self, count: int, size: int) -> Emission:
