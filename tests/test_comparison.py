@@ -139,3 +139,9 @@ def test_settings_that_differ_are_named(changes: dict[str, Any], says: str) -> N
 def test_settings_that_are_unknown_are_said_to_be() -> None:
     assert differing_settings({}, SETTINGS) == "unknown of A"
     assert differing_settings({}, {}) == "unknown of A and B"
+
+
+def test_memory_that_is_too_small_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drpt.machine.free_memory", lambda: 10 * 8 * 4 * 6 * 3 - 1)
+    with pytest.raises(ValueError, match=r"comparison of 4x6 pixels needs 5\.76 kB of memory"):
+        compare(flat(1, 1, 1), flat(1, 1, 1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -221,3 +222,33 @@ class TestRefusals:
         for name, missing in (("a.exr", "bounces, jitter, seed"), ("a.npy", "scene, bounces")):
             with pytest.raises(ValueError, match=f"this is no render: .* has no {missing}"):
                 merge([tmp_path / name, renders(0)])
+
+
+def test_memory_that_is_too_small_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten copies of the picture and three of its layer, which it is: 13 · 36000 · 8 bytes."""
+    path = tmp_path / "a.exr"
+    write(path, TRUTH.astype(np.float32), METADATA)
+    found = read(path)
+    monkeypatch.setattr("drpt.merging.read", lambda _: found)
+    monkeypatch.setattr("drpt.machine.free_memory", lambda: 13 * TRUTH.size * 8)
+    assert merge([path])[0]["RGB"].shape == SHAPE
+    monkeypatch.setattr("drpt.machine.free_memory", lambda: 13 * TRUTH.size * 8 - 1)
+    with pytest.raises(ValueError, match=r"a\.exr: to merge it needs 3\.744 MB of memory"):
+        merge([path])
+
+
+def test_memory_for_many_pictures_is_that_for_two(tmp_path: Path) -> None:
+    """The peak, in float64 copies of the picture, is below what is asked for, and two sums."""
+    paths = [tmp_path / f"{seed}.exr" for seed in range(5)]
+    for seed, path in enumerate(paths):
+        write(path, TRUTH.astype(np.float32), {**METADATA, "seed": seed})
+    merge(paths)  # imports
+    tracemalloc.start()
+    try:
+        merge(paths)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < (10 + 3 + 2) * TRUTH.size * 8

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.fuzz.mutations import HUGE, NUMBERS, mutate_bytes, mutate_integer
 from benchmarks.fuzz.target import Target
 from drpt import checkpoint, state
-from drpt.checkpoint import MAGIC, Checkpoint, CheckpointError
+from drpt.checkpoint import FORMAT, MAGIC, Checkpoint, CheckpointError
 from drpt.files import archives
 from drpt.film import Film
 from drpt.scene import Camera, Scene, Sphere
@@ -60,8 +60,16 @@ def make(random: Random) -> bytes:
         body = mutate_bytes(body, random, random.randint(1, 3))
     if random.random() < 0.1:
         body = mutate_integer(body, random, random.choice((1, 2, 4, 8)))
-    content = MAGIC + hashlib.sha256(body).digest() + body
+    content = _magic(random) + hashlib.sha256(body).digest() + body
     return mutate_bytes(content, random) if random.random() < 0.05 else content
+
+
+def _magic(random: Random) -> bytes:
+    """Return the first bytes; a few times those of a format whose number is no text."""
+    if random.random() < 0.98:
+        return MAGIC
+    start = random.choice((0, 2, len(FORMAT)))
+    return MAGIC[:start] + random.randbytes(len(MAGIC) - start - 1) + b"\n"
 
 
 def _change(table: dict[str, Any], random: Random) -> None:

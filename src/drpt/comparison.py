@@ -16,6 +16,7 @@ from drpt.crosscheck.flip import has_flip, mean_flip
 from drpt.distribution import install_command
 from drpt.error import DARK
 from drpt.immutable import Immutable
+from drpt.machine import require_memory
 from drpt.output import write
 
 if TYPE_CHECKING:
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Metadata = Mapping[str, str | int | float]
 
+DOUBLE = 8
+"""Bytes of a float64."""
+COPIES = 10
+"""Number of float64 copies of a picture in memory while two are compared."""
 SETTINGS = ("scene", "mode", "spp", "bounces", "sampler", "seed", "jitter")
 """What makes a difference, of the metadata of a picture."""
 
@@ -101,7 +106,7 @@ def compare(image: ArrayLike, reference: ArrayLike) -> Comparison:
     """Compare two pictures with linear radiance, such as results, of shape (height, width, 3).
 
     Values that are not finite make the numbers so, too. Raises `ValueError` where the shapes are
-    not the same or not those of pictures.
+    not the same or not those of pictures, or where the memory is too small.
     """
     x, y = _picture("image", image), _picture("reference", reference)
     if x.shape != y.shape:
@@ -124,10 +129,12 @@ def _relative(difference: Floats, mean: Floats) -> Floats:
 
 
 def _picture(name: str, values: ArrayLike) -> Floats:
-    picture = np.asarray(values, np.float64)
+    picture = np.asarray(values)
     if picture.ndim != 3 or picture.shape[2] != 3 or not picture.size:
         raise ValueError(f"{name}: its shape is {picture.shape}; it must be (height, width, 3)")
-    return picture
+    size = f"a comparison of {picture.shape[1]}x{picture.shape[0]} pixels"
+    require_memory(COPIES * picture.size * DOUBLE, size)
+    return picture.astype(np.float64)
 
 
 def _non_finite(picture: Floats) -> int:

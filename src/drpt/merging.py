@@ -12,12 +12,12 @@ errors.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from drpt.error import relative_mse
+from drpt.machine import require_memory
 from drpt.messages import one_line
 from drpt.output import read
 from drpt.output.metadata import MOST
@@ -39,6 +39,13 @@ SAME = ("scene", "bounces", "jitter")
 SUMMED = ("spp", "seconds", "rays", "non_finite")
 """What adds up, of its metadata."""
 NEEDED = (*SAME, "spp", "seed")
+
+DOUBLE = 8
+"""Bytes of a float64."""
+COPIES = 10
+"""Number of float64 copies of the picture in memory while it is added to others."""
+LAYER_COPIES = 3
+"""Likewise of each layer, that of the picture included."""
 
 _COMMA = ", "
 
@@ -66,11 +73,15 @@ def merge(paths: Sequence[Path]) -> tuple[Layers, Metadata]:
     OSError
         A file is missing or unreadable.
     ValueError
-        One is no render with its metadata, or does not fit to those before it.
+        One is no render with its metadata, does not fit to those before it, or needs more memory
+        than there is.
     """
     first, *others = paths
     with np.errstate(invalid="ignore"):  # pictures may hold infinite values
-        return reduce(_Sums.plus, map(_read, others), _read(first)).divided()
+        sums = _read(first)
+        for path in others:
+            sums = sums.plus(_read(path))
+        return sums.divided()
 
 
 def seeds(metadata: Metadata) -> list[str]:
@@ -142,6 +153,8 @@ class _Sums:
 def _read(path: Path) -> _Sums:
     single, metadata = read(path)
     _check_render(path, metadata)
+    values = COPIES * single["RGB"].size + LAYER_COPIES * sum(map(np.size, single.values()))
+    require_memory(values * DOUBLE, f"{path}: to merge it")
     layers = {name: layer.astype(np.float64) for name, layer in single.items()}
     image = layers["RGB"]
     samples = layers.pop(SAMPLES, np.full(image.shape[:2], metadata["spp"], np.float64))
