@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import struct
 import zipfile
+import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -103,7 +105,33 @@ def _archive(random: Random, arrays: dict[str, Any]) -> bytes:
             file.writestr(f"{name}.npy", _member(random, array))
         if random.random() < 0.02:
             file.writestr("bomb.npy", bytes(10**7))
-    return body.getvalue()
+    content = body.getvalue()
+    return _inflated(content) if random.random() < 0.01 else content
+
+
+def _inflated(archive: bytes) -> bytes:
+    """Let the last array claim 2 GiB, in its own header and in the directory of the archive.
+
+    Source: PKWARE, "APPNOTE.TXT", 4.3.12: checksum, size and size in memory follow 16 bytes.
+    """
+    entry = archive.rindex(b"PK\x01\x02")
+    header = archive.rfind(b"\x93NUMPY")
+    shape = archive.find(b"'shape': ", header) + len(b"'shape': ")
+    end = archive.find(b"\n", shape)
+    dictionary = b"(268435456, 2), }".ljust(end - shape)
+    if header < 0 or len(dictionary) > end - shape:  # it is compressed
+        return archive
+    size = int.from_bytes(archive[entry + 24 : entry + 28], "little")
+    content = (archive[header:shape] + dictionary + archive[end:])[:size]
+    claimed = zlib.crc32(content), size, end + 1 - header + 2**31
+    directory = archive[entry : entry + 16] + struct.pack("<3I", *claimed)
+    return (
+        archive[:header]
+        + content
+        + archive[header + size : entry]
+        + directory
+        + archive[entry + 28 :]
+    )
 
 
 def _member(random: Random, array: Any) -> bytes:

@@ -113,6 +113,8 @@ def _fault_of_message(message: str, path: Path) -> str:
         return f"its message is no line of printable characters: {message!r}"
     if path.name not in message:
         return f"its message does not name the file: {message}"
+    if "Unable to allocate" in message:
+        return f"it allocates memory before it looks at sizes: {message}"
     if len(message) > 1000:
         return f"its message has {len(message)} characters: {message[:200]}"
     return ""
