@@ -230,7 +230,7 @@ def _weights(image: Array, noise: Array) -> Array:
     Image Enhancement and Noise Filtering by Use of Local Statistics"), a pixel is drawn to the mean
     of its neighbours, the more of their variance is noise; but here they alone decide.
     """
-    with np.errstate(invalid="ignore"):  # of what is not finite, the weight is not a number
+    with np.errstate(invalid="ignore", over="ignore"):  # weights of what is not finite are none
         mean = _of_neighbours(image)
         variance = np.maximum(_of_neighbours(np.square(image)) - mean**2, TINY)
         kept = np.maximum(variance - _of_neighbours(noise), 0) / variance

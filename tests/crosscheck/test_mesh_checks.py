@@ -100,6 +100,14 @@ BAD = {
     "missing": (ply("ascii", faces=2) + f"{ROWS}3 0 1 2 {' ' * 99}\n".encode(), "are 22"),
     "count": (ply("ascii", -1) + ROWS.encode(), "a wrong line, 'element vertex -1'"),
     "type": (ply("ascii", index="x") + ROWS.encode(), "'property list uchar x vertex_indices'"),
+    "no properties": (
+        ply("binary_little_endian", faces=2**63).replace(b"uchar int", b"uchar") + BINARY,
+        "a wrong line, 'property list uchar vertex_indices'",
+    ),
+    "no columns": (
+        ply("ascii", faces=2**63).replace(b"property list uchar int vertex_indices\n", b""),
+        "an element without properties",
+    ),
     "twice": (ply("ascii").replace(b"face 1", b"vertex 1") + ROWS.encode(), "same element twice"),
     "no faces": (ply("ascii", faces=0) + ROWS.encode(), "it has no faces"),
     "no end": (b"ply\nformat ascii 1.0\n" + b" " * 10**6, "no PLY header that ends within"),

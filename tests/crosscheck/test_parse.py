@@ -351,3 +351,16 @@ def test_wrong_sensors_are_refused(sensor: dict[str, Any], says: str) -> None:
 def test_wrong_shapes_are_refused(shape: dict[str, Any], says: str) -> None:
     with pytest.raises(SceneError, match=says):
         from_mitsuba(scene_dict(wrong={"b": GREY, **shape}))
+
+
+def test_a_center_that_is_no_point_is_refused() -> None:
+    ball = {"type": "sphere", "center": 1.0}
+    with pytest.raises(SceneError, match=r"^ball: .*its center is 1.0; it must be a point"):
+        from_mitsuba(scene_dict(ball=ball))
+
+
+def test_a_mesh_without_triangles_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    mesh = {"type": "obj", "filename": str(tmp_path / "a.obj"), "face_normals": True}
+    with pytest.raises(SceneError, match="it has no faces"):
+        from_mitsuba(scene_dict(a=mesh))

@@ -191,6 +191,15 @@ def test_npz(tmp_path: Path, normals: np.ndarray | None) -> None:
         ("a.ply", ply(2) + ROWS[:12], "after 2 of 5 rows of its vertex list"),
         ("a.ply", ply(1) + ROWS.replace("2 2 1", "2 x 1") + "3 0 1 2", "no readable PLY file"),
         ("a.ply", ply(1, encoding="binary_little_endian") + ROWS, "no readable PLY file"),
+        ("a.ply", ply(1) + ROWS.replace("2 2 1", "2") + "5 0 1 2 3 4", "fewer numbers than others"),
+        ("a.ply", ply(1) + ROWS + "3 0 1 1e300", "no readable PLY file"),
+        (
+            "a.ply",
+            ply(1).replace("list uchar int", "list uchar float") + ROWS + "4 0 1 2 1e30",
+            "no",
+        ),
+        ("a.ply", ply(4, vertices=0).replace("property list", "p list") + ROWS, "0 of 4 rows"),
+        ("a.ply", ply(1).replace("uchar", "9" * 9999) + ROWS, "no readable PLY file"),
         ("a.npz", "", "not an NPZ file"),
         ("a.npz", "garbage", "not an NPZ file"),
     ],
@@ -201,6 +210,7 @@ def test_bad_files(tmp_path: Path, name: str, content: str, expected: str) -> No
     assert str(caught.value).startswith(f"{tmp_path / name}: ")
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 1000
 
 
 def test_bad_npz(tmp_path: Path) -> None:

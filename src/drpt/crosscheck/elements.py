@@ -86,6 +86,15 @@ class Element:
         """Return a property that is a text; raise `SceneError` if it is something else."""
         return self._typed(name, default, (str,), "a text")
 
+    def point(self, name: str) -> tuple[float, float, float]:
+        """Return a property that is a point, 0 by default; raise `SceneError` if it is not."""
+        value = self.get(name, (0, 0, 0))
+        try:
+            x, y, z = (float(v) for v in value)
+        except (TypeError, ValueError):
+            raise self.refuse(f"its {name} is {value!r}; it must be a point") from None
+        return x, y, z
+
     def _typed(self, name: str, default: _Value, kinds: Any, words: str) -> _Value:
         value: _Value = self.get(name, default)
         if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):

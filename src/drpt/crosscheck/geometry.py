@@ -83,6 +83,8 @@ def face_normals(vertices: Floats, faces: NDArray[Any]) -> Floats:
 
 def _flip(mi: Any, mesh: Any, front: Floats) -> int:
     """Return -1 if Mitsuba takes the sides opposite to `front`, (m, 3), for the triangles' own."""
+    if not len(front):
+        return 1
     longest = int(np.argmax((front**2).sum(axis=1)))
     hit = mi.PreliminaryIntersection3f()
     hit.prim_index = longest

@@ -132,8 +132,12 @@ def _ply_elements(lines: list[list[str]], order: str) -> list[_Element]:
                     elements[-1] = _extended(elements[-1], list_of)
                 case ["property", kind, _]:
                     elements[-1] = _extended(elements[-1], [("", order + PLY_TYPES[kind])])
+                case ["element" | "property", *_]:
+                    raise ValueError
         except (KeyError, ValueError, IndexError):
             raise SceneError(f"its header has a wrong line, {' '.join(words)!r}") from None
+    if any(element.length and not element.row.names for element in elements):
+        raise SceneError("its header has an element without properties")
     return elements
 
 

@@ -188,5 +188,5 @@ def _sphere(element: Element, shown: Surface) -> Sphere:
     inward = element.flag("flip_normals") != (np.linalg.det(to_world[:3, :3]) < 0)
     if inward and shown.is_light:
         raise SceneError("it emits inward; a sphere of drpt's emits outward")
-    center = to_world @ [*element.get("center", (0, 0, 0)), 1]
+    center = to_world @ [*element.point("center"), 1]
     return Sphere(center[:3], scale * element.number("radius", 1.0), **shown.parameters())

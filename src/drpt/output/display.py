@@ -38,7 +38,8 @@ def to_display(
 
     Source: IEC 61966-2-1 (1999).
     """
-    exposed = np.maximum(radiance * np.exp2(np.float64(exposure)), 0.0)
+    with np.errstate(invalid="ignore", over="ignore"):  # infinity times 0 is not a number
+        exposed = np.maximum(radiance * np.exp2(np.float64(exposure)), 0.0)
     linear = np.minimum(filmic(exposed) if curve == "filmic" else exposed, 1.0)
     linear[np.isnan(linear).any(axis=-1)] = _MAGENTA
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)

@@ -39,6 +39,8 @@ MAX_FIELD = 200
 """Characters of a field that an error names: keys of a file may have any length."""
 MAX_SOURCE = 400
 """Likewise of the path of a file."""
+MAX_PROBLEM = 390
+"""Likewise of the words about it, which may quote the file."""
 
 
 def plain(value: float) -> str:
@@ -64,7 +66,8 @@ class SceneError(ValueError):
         self.field = field
         self.source = source
         where = shortened(source, MAX_SOURCE), shortened(field, MAX_FIELD)
-        super().__init__(one_line(": ".join(part for part in (*where, problem) if part)))
+        words = shortened(one_line(problem), MAX_PROBLEM)
+        super().__init__(one_line(": ".join(part for part in (*where, words) if part)))
 
     def within(self, parent: str) -> SceneError:
         """Return the same error, seen from the field `parent` that holds this one."""

@@ -9,6 +9,7 @@ are left out.
 from __future__ import annotations
 
 import io
+import logging
 import os
 import re
 import warnings
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+logging.getLogger("trimesh").addHandler(logging.NullHandler())  # else it writes to stderr
 OBJ_CORNER = re.compile(r"(I)(?:/(?:I)?(?:/(I))?)?".replace("I", "-?[0-9]{1,18}"))
 """A corner of a face: v, v/vt, v//vn or v/vt/vn; the groups are v and vn."""
 OBJ_IGNORED = ("g", "l", "mg", "mtllib", "o", "p", "s", "usemtl", "vp", "vt")
@@ -91,6 +93,8 @@ def _read_ply(content: bytes, path: Path) -> MeshArrays:
     vertices, faces = mesh.get("vertices"), _ply_faces(mesh)
     if vertices is None or faces is None or not len(faces):
         raise SceneError(NO_FACES)
+    if vertices.dtype == object:
+        raise SceneError("some of its vertices have fewer numbers than others")
     triangles = _triangles(vertices, faces, path, _ply_places(content, elements))
     return MeshArrays(vertices, triangles, mesh.get("vertex_normals"))
 
@@ -117,7 +121,7 @@ def _ply_faces(mesh: dict[str, Any]) -> NDArray[Any] | None:
 def _check_rows(name: str, element: dict[str, Any]) -> None:
     """Raise unless an element of a PLY file has all its rows, and lists of one size if binary."""
     data = element.get("data", ())
-    rows = len(next(iter(data.values())) if isinstance(data, dict) else data)
+    rows = len(next(iter(data.values()), ()) if isinstance(data, dict) else data)
     if rows != element["length"]:
         raise SceneError(f"it ends after {rows} of {element['length']} rows of its {name} list")
     if isinstance(data, np.ndarray):
@@ -148,11 +152,25 @@ def _call_trimesh(
 ) -> dict[str, Any]:
     """Return what one of the loaders of trimesh reads; they let any error of theirs through."""
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _strict_numbers():
             warnings.simplefilter("error", DeprecationWarning)  # all that NumPy < 2.3 says of "x"
             return load(io.BytesIO(content), skip_materials=True, **options)
     except Exception as error:
         raise SceneError(f"this is no readable {kind}: {error}") from None
+
+
+def _strict_numbers() -> np.errstate:
+    """Numbers that an array's type cannot hold are errors."""
+    return np.errstate(invalid="raise", over="raise")
+
+
+def _whole(indices: NDArray[Any]) -> NDArray[np.int64]:
+    """Indices as whole numbers, which a file may give as floating-point ones."""
+    try:
+        with _strict_numbers():
+            return indices.astype(np.int64)
+    except FloatingPointError:
+        raise SceneError("a vertex index of a face is no whole number") from None
 
 
 def _obj_geometry(text: str, path: Path) -> str:
@@ -244,14 +262,14 @@ def _triangles(
 ) -> NDArray[np.int64]:
     """Return faces as triangles: first those of triangles, then of quads, then of others."""
     if faces.ndim == 2 and faces.shape[1] == 3:
-        return faces.astype(np.int64)
+        return _whole(faces)
     lengths = np.array([len(face) for face in faces] if faces.ndim == 1 else faces.shape[1:])
     numbers = np.flatnonzero(np.broadcast_to(lengths, len(faces)) > 2)
     if not len(numbers):
         raise SceneError(NO_FACES)
     sizes = np.broadcast_to(lengths, len(faces))[numbers]
     chosen = faces[numbers]
-    indices = (np.concatenate(chosen) if faces.ndim == 1 else chosen.ravel()).astype(np.int64)
+    indices = _whole(np.concatenate(chosen) if faces.ndim == 1 else chosen.ravel())
     outside = (indices < 0) | (indices >= len(vertices))
     if outside.any():
         bad = int(np.argmax(outside))
