@@ -36,7 +36,9 @@ def estimate_of(blocks: Floats) -> Estimate:
 def light_of(emission: Floats, seen: float, factor: float = 1e9) -> Emission:
     """Emission (runs, 3) that the picture has found in its pixel `NUMBER`."""
     pixels, found = np.array([NUMBER]), emission.mean(axis=0)[None]
-    return Emission(pixels, emission[:, None], found, np.full((1, 3), seen), factor)
+    return Emission(
+        pixels, emission[:, None], found, np.full((1, 3), seen), factor, np.full(3, 1e9)
+    )
 
 
 NUMBER = LAMP_PIXEL[0] * SIDE + LAMP_PIXEL[1]
@@ -55,6 +57,18 @@ def test_the_error_of_emission_is_that_of_the_picture(found: float, elsewhere: f
     true = (found - 3) ** 2 / ((3 + elsewhere) ** 2 + DARK) / SIDE**2
     assert estimate.relative_mse == pytest.approx(true, rel=1e-6, abs=1e-11)
     assert estimate.bound == pytest.approx(estimate.relative_mse)
+
+
+@pytest.mark.parametrize("reflected", [0.0, 1.0, 4.0])
+def test_what_a_pixel_reflects_beside_a_light_makes_up_for_its_emission(reflected: float) -> None:
+    """A light of radiance 4 covers half of a pixel, and more or less of it in runs of samples."""
+    covered = np.array([0.6, 0.8, 0.4, 0.6])[:, None] * np.ones(3)
+    blocks = np.ones((RUNS, SIDE**2, 3))
+    blocks[:, NUMBER] = 4 * covered + reflected * (1 - covered)
+    light = replace(light_of(4 * covered, 2.0), radiance=np.full(3, 4.0))
+    found = measured(estimate_of(blocks), blocks, 1, light)
+    true = (0.1 * (4 - reflected)) ** 2 / ((2 + reflected / 2) ** 2 + DARK) / SIDE**2
+    assert found.relative_mse == pytest.approx(true, rel=1e-6, abs=1e-12)
 
 
 def test_noise_that_is_not_of_emission_is_estimated_as_before() -> None:

@@ -151,7 +151,12 @@ class Estimate:
         """
         if not self._levels:
             return np.full_like(self.image, np.nan)
-        return self._variances(self._ratio) * self._weights + self.measured
+        return self.variances * self._weights + self.measured
+
+    @property
+    def variances(self) -> Array:
+        """Variance of each value (height, width, 3), of its own samples but for ρ."""
+        return self._variances(self._ratio)
 
     @property
     def relative_mse(self) -> float:

@@ -11,6 +11,10 @@ variance is less by a factor k. Let e = f − E[f] be the error, v its variance,
     E[e² | d] = κ² d² + (1 − κ) v,    κ = k / (k + 1),
 
 if f and s are normal. With many rays that is d², and v need not be known.
+
+A ray that meets a light is not reflected. Let L be the light's radiance, and r the mean of what the
+pixel reflects. The covariance of a sample's emission and reflected light is −f r, the variance of
+its emission f (L − f). So of an error e of emission, e r / (L − f) is made up for.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drpt.error import DARK, Estimate, squared_differences
+from drpt.error import DARK, TINY, Estimate, squared_differences
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,6 +57,8 @@ class Emission:
         Mean of what additional camera rays see, (n, 3).
     factor
         Additional camera rays per sample of the picture.
+    radiance
+        Greatest radiance of a light, (3,).
     """
 
     pixels: NDArray[np.int64]
@@ -60,6 +66,14 @@ class Emission:
     found: Array
     seen: Array
     factor: float
+    radiance: Array
+
+    def less_reflected(self, image: Array) -> Emission:
+        """Less what is made up for by what pixels of values (n, 3) reflect."""
+        left = np.maximum(self.radiance - self.found, TINY)
+        share = np.clip(1 - np.maximum(image - self.found, 0) / left, 0, 1)
+        parts = self.blocks * share, self.found * share, self.seen * share
+        return Emission(self.pixels, *parts, self.factor, self.radiance)
 
 
 def measured(
@@ -82,12 +96,12 @@ def measured(
     trust = light.factor / (light.factor + 1)
     squares = np.zeros_like(image)
     with np.errstate(invalid="ignore", over="ignore"):  # such errors are not a number, or infinite
+        light = light.less_reflected(image[chosen])
         error = light.found - light.seen
         image[chosen] -= error
         reflected = (blocks[:, chosen] - light.blocks).astype(np.float32)
         differences[:, chosen] = squared_differences(reflected, size)
-        coarse = squared_differences(light.blocks.astype(np.float32), size)[0]
-        squares[chosen] = trust**2 * error**2 + (1 - trust) * coarse
+        squares[chosen] = trust**2 * error**2 + (1 - trust) * _variances(estimate, light, size)
         squares /= image**2 + DARK
     return Estimate(
         differences.reshape(-1, *shape),
@@ -96,6 +110,15 @@ def measured(
         estimate.independent,
         squares.reshape(shape),
     )
+
+
+def _variances(estimate: Estimate, light: Emission, size: int) -> Array:
+    """Variances (n, 3) of the emission that a picture has found, as far as its samples tell."""
+    if not len(light.pixels):
+        return light.found
+    levels = squared_differences(light.blocks.astype(np.float32), size)[:, None]
+    found = Estimate(levels, light.found[None], estimate.growth, estimate.independent)
+    return np.asarray(found.variances[0])
 
 
 def rays_for(few: int, pixels: int, spp: int) -> int:

@@ -186,6 +186,8 @@ class Rendering:
         rays = rays_for(len(pixels), self.settings.pixels, self.spp)
         shared = self.launcher.paths_per_ray // lights.paths_per_ray
         own, of_block = -(-self.spp // shared), size // shared
+        shapes = self.settings.scene.shapes
+        radiance = [np.asarray(shape.radiance) for shape in shapes if shape.is_light]
         blocks, found, seen = [], [], []
         for part in runs(pixels):
             with backend.interrupts_put_off():
@@ -203,6 +205,7 @@ class Rendering:
             np.concatenate([np.zeros((0, 3)), *found]),
             np.concatenate([np.zeros((0, 3)), *seen]),
             rays / self.spp,
+            np.max([np.zeros(3), *radiance], axis=0),
         )
 
     def _run(self, launcher: Launcher, samples: range) -> None:
