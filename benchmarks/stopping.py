@@ -1,9 +1,9 @@
 """How often ``target_error`` stops too early where one rarely lit pixel holds half of the error.
 
-A Markdown table: ``python -m benchmarks.stopping``, an hour; ``--seeds 40`` takes a fifth. *Too
+A Markdown table: ``python -m benchmarks.stopping``; ``--seeds 40`` takes a fifth of the time. *Too
 early* are renders that stop with a true relMSE above twice the target, with an interval of 95 %
-(Wilson 1927, "Probable Inference, the Law of Succession, and Statistical Inference"). Where the
-whole interval is above `ALLOWED`, the exit status is 1.
+(Wilson 1927, "Probable Inference, the Law of Succession, and Statistical Inference"). *Uncertain*
+renders are marked so. Where the whole interval is above `ALLOWED`, the exit status is 1.
 """
 
 from __future__ import annotations
