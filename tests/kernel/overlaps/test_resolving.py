@@ -77,7 +77,7 @@ def test_an_earlier_shape_that_is_covered_is_gone(extra: tuple[Shape, ...]) -> N
 
 
 def test_copies_of_triangles_are_gone_without_a_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(cutting, "subtract")
+    monkeypatch.delattr(cutting, "uncovered")
     corners = np.random.default_rng(1).normal(size=(2400, 3))
     faces = np.arange(2400).reshape(-1, 3)
     first, copy = (drpt.Mesh(corners, faces, material=material) for material in (GREY, WHITE))

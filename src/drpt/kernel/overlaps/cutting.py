@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
 from drpt.kernel.facets import area_vectors, has_area, merge_coplanar
-from drpt.kernel.overlaps.clipping import fan, subtract, widen
+from drpt.kernel.overlaps.batches import Polygons
+from drpt.kernel.overlaps.clipping import uncovered
 from drpt.kernel.overlaps.coplanar import SAME_PLACE
 from drpt.kernel.overlaps.triangle_pairs import lies_inside
 from drpt.kernel.parts import NO_TRIANGLES, Part
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from drpt.kernel.parts import Triangles
@@ -35,14 +38,25 @@ def cut_parts(parts: list[Part], triangles: Triangles, pairs: Indices) -> list[P
     gone = _wholly_covered(triangles, pairs)
     # What is gone need not be cut, and what covers it covers all that it would have covered.
     pairs = pairs[~np.isin(pairs, gone).any(axis=1)]
-    cut: dict[int, Part] = {}
-    for place in np.unique(triangles.part[np.concatenate([gone, pairs[:, 0]])]):
-        ends = triangles.first[place : place + 2]
-        part = triangles.parts[place]
-        gone_here = gone[slice(*np.searchsorted(gone, ends))]
-        pairs_here = pairs[slice(*np.searchsorted(pairs[:, 0], ends))]
-        cut[part.number] = _cut_part(triangles, place, gone_here, pairs_here)
+    places = np.unique(triangles.part[np.concatenate([gone, pairs[:, 0]])])
+    tasks = [_task(triangles, place, gone, pairs) for place in places]
+    cut = {task.part.number: part for task, part in zip(tasks, _cut(tasks), strict=True)}
     return [cut.get(part.number, part) for part in parts]
+
+
+class _Task(NamedTuple):
+    """A part, its triangles that are gone or cut, and the polygons that are to be cut.
+
+    ``covers`` cover the polygons with the numbers ``of``, ascending. If the part has normals, the
+    polygons are the triangles with the numbers ``cut``.
+    """
+
+    part: Part
+    gone: Indices
+    cut: Indices
+    polygons: list[Array]
+    covers: list[Array]
+    of: Indices
 
 
 def _wholly_covered(triangles: Triangles, pairs: Indices) -> Indices:
@@ -52,60 +66,71 @@ def _wholly_covered(triangles: Triangles, pairs: Indices) -> Indices:
     return np.unique(pairs[lies_inside(corners, rooms), 0])
 
 
-def _cut_part(triangles: Triangles, place: int, gone: Indices, pairs: Indices) -> Part:
-    """A part without triangles that are gone, and without what pairs cover of others."""
+def _task(triangles: Triangles, place: int, gone: Indices, pairs: Indices) -> _Task:
+    """What is to be done with a part; ``gone`` and ``pairs`` are those of all parts."""
     part, first = triangles.parts[place], triangles.first[place]
+    ends = triangles.first[place : place + 2]
+    gone = gone[slice(*np.searchsorted(gone, ends))] - first
+    pairs = pairs[slice(*np.searchsorted(pairs[:, 0], ends))]
     covered, at = np.unique(pairs[:, 0], return_inverse=True)
-    numbers = covered - first
-    corners, normals = part.primitives[numbers], part.normals
-    if len(normals) or len(pairs) > MERGE_LIMIT:
-        covers = np.split(pairs[:, 1], np.cumsum(np.bincount(at)))[: len(covered)]
-        pieces = [
-            _uncovered(polygon, list(triangles.corners(others)))
-            for polygon, others in zip(corners, covers, strict=True)
-        ]
-    else:
-        pieces = _merged_pieces(triangles, pairs)
-    left = np.delete(np.arange(len(part.primitives)), np.concatenate([gone - first, numbers]))
+    if len(part.normals) or len(pairs) > MERGE_LIMIT:
+        polygons, covers = list(triangles.corners(covered)), list(triangles.corners(pairs[:, 1]))
+        return _Task(part, gone, covered - first, polygons, covers, at.ravel())
+    return _Task(part, gone, covered - first, *_merged(triangles, pairs))
+
+
+def _merged(triangles: Triangles, pairs: Indices) -> tuple[list[Array], list[Array], Indices]:
+    """Polygons of flat triangles in one plane, their covers, and which polygon each covers."""
+    polygons: list[Array] = []
+    covers: list[Array] = []
+    of: list[int] = []
+    corners, vectors = triangles.corners(pairs[:, 0]), triangles.vectors[pairs[:, 0]]
+    normals = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    offsets = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.abs(corners).max(initial=1e-300)
+    rows = np.round(np.column_stack([normals, offsets]), DIGITS)
+    plane = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
+    for k in range(plane.max(initial=-1) + 1):
+        first, second = (np.unique(column) for column in pairs[plane == k].T)
+        above = merge_coplanar(triangles.corners(second))
+        for polygon in merge_coplanar(triangles.corners(first)):
+            of += [len(polygons)] * len(above)
+            covers += above
+            polygons.append(polygon)
+    return polygons, covers, np.array(of, np.intp)
+
+
+def _cut(tasks: list[_Task]) -> Iterator[Part]:
+    """The parts without what is gone and what is covered; all polygons are cut at once."""
+    ends = np.cumsum([0, *(len(task.polygons) for task in tasks)])
+    polygons = [polygon for task in tasks for polygon in task.polygons]
+    covers = [cover for task in tasks for cover in task.covers]
+    of = np.concatenate([task.of + end for task, end in zip(tasks, ends, strict=False)])
+    pieces, owners = NO_TRIANGLES, np.empty(0, np.intp)
+    if polygons:
+        pieces, owners = uncovered(Polygons.of(polygons), Polygons.of(covers), of, SAME_PLACE)
+    for task, start, stop in zip(tasks, ends, ends[1:], strict=False):
+        here = slice(*np.searchsorted(owners, [start, stop]))
+        yield _cut_part(task, pieces[here], owners[here] - start)
+
+
+def _cut_part(task: _Task, pieces: Array, owners: Indices) -> Part:
+    """A part with pieces in place of its triangles that are cut."""
+    part, normals = task.part, task.part.normals
+    left = np.delete(np.arange(len(part.primitives)), np.concatenate([task.gone, task.cut]))
     if len(normals):
-        mixed = map(_interpolated, corners, normals[numbers], pieces)
-        normals = np.concatenate([normals[left], *mixed])
-    whole = np.concatenate([part.primitives[left], *pieces])
+        mixed = _interpolated(part.primitives[task.cut], normals[task.cut], pieces, owners)
+        normals = np.concatenate([normals[left], mixed])
+    whole = np.concatenate([part.primitives[left], pieces])
     vectors = area_vectors(whole)
     kept = has_area(vectors)
     normals = normals[kept] if len(normals) else normals
     return Part(part.number, part.shape, whole[kept], normals, vectors[kept], is_cut=True)
 
 
-def _merged_pieces(triangles: Triangles, pairs: Indices) -> list[Array]:
-    """Remaining triangles (m, 3, 3) of flat ones; those in one plane are cut as polygons."""
-    if not len(pairs):
-        return []
-    corners, vectors = triangles.corners(pairs[:, 0]), triangles.vectors[pairs[:, 0]]
-    normals = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    offsets = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.abs(corners).max()
-    rows = np.round(np.column_stack([normals, offsets]), DIGITS)
-    plane = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
-    pieces = []
-    for k in range(plane.max() + 1):
-        first, second = (np.unique(column) for column in pairs[plane == k].T)
-        covers = merge_coplanar(triangles.corners(second))
-        polygons = merge_coplanar(triangles.corners(first))
-        pieces += [_uncovered(polygon, covers) for polygon in polygons]
-    return pieces
-
-
-def _uncovered(polygon: Array, covers: list[Array]) -> Array:
-    """Triangles (m, 3, 3) of the part of a polygon that no cover hides."""
-    overlap = SAME_PLACE * np.abs(polygon).max()
-    pieces = subtract(polygon, covers, overlap)
-    return np.concatenate([NO_TRIANGLES, *(fan(widen(piece, overlap)) for piece in pieces)])
-
-
-def _interpolated(corners: Array, normals: Array, pieces: Array) -> Array:
-    """Interpolated normals (m, 3, 3), not of unit length, at the corners of a triangle's pieces."""
-    a, b, c = corners
-    basis = np.stack([b - a, c - a, np.cross(b - a, c - a)], axis=1)
-    weights = np.linalg.solve(basis, (pieces - a).reshape(-1, 3).T).T
-    mixed = normals[0] + weights[:, :2] @ (normals[1:] - normals[0])
-    return np.asarray(mixed.reshape(-1, 3, 3))
+def _interpolated(corners: Array, normals: Array, pieces: Array, owners: Indices) -> Array:
+    """Interpolated normals (m, 3, 3), not of unit length, at the corners of triangles' pieces."""
+    a, b, c = corners[owners].swapaxes(0, 1)
+    basis = np.stack([b - a, c - a, np.cross(b - a, c - a)], axis=2)
+    weights = np.linalg.solve(basis[:, None], (pieces - a[:, None])[..., None])[..., :2, 0]
+    first, others = normals[owners, :1], normals[owners, 1:]
+    return np.asarray(first + weights @ (others - first))
