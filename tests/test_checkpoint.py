@@ -157,7 +157,7 @@ class TestResuming:
         change: dict[str, Any] = {"spp": 2**16, "target_error": 1e-3}
         stopped = finish(rendering_of(path, **change))
         assert 64 <= stopped.spp < 2**16
-        monkeypatch.setattr(Launcher, "launch", None)
+        monkeypatch.setattr(drpt.Rendering, "_run", None)  # which traces samples
         again = finish(rendering_of(path, **change))
         assert_equal(again, stopped)
         assert not again.partial

@@ -107,7 +107,7 @@ def expected() -> tuple[Floats, Floats]:
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", drpt.Mode)
 def test_pictures_are_those_of_the_oracle(mode: str, expected: tuple[Floats, Floats]) -> None:
-    spp = 2**14 if "uniform" in mode or "implicit" in mode else 2**11
+    spp = {"implicit-uniform": 2**16, "mis": 2**11, "guided": 2**11}.get(mode, 2**14)
     images = [drpt.render(MIXED_SCENE, spp, 3, mode, seed=seed).image for seed in range(SEEDS)]
     image, error = np.mean(images, axis=0), np.std(images, axis=0, ddof=1) / np.sqrt(SEEDS)
     truth, its_error = expected

@@ -88,6 +88,8 @@ class Report:
         Infinite where samples do not help: in black pictures, and beyond the reference's own error.
         """
         test = self.comparison.of_image
+        if not np.all(test.reference):
+            return np.inf
         known = self.reference.tolerance * np.abs(test.reference)
         left = TELLING * np.abs(test.reference) - known
         if not (left > 0).all():
