@@ -102,11 +102,18 @@ def _archive(random: Random, arrays: dict[str, Any]) -> bytes:
         method = random.choice((zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA))
     with zipfile.ZipFile(body, "w", method) as file:
         for name, array in arrays.items():
-            file.writestr(f"{name}.npy", _member(random, array))
+            file.writestr(_entry(f"{name}.npy", method), _member(random, array))
         if random.random() < 0.02:
-            file.writestr("bomb.npy", bytes(10**7))
+            file.writestr(_entry("bomb.npy", method), bytes(10**7))
     content = body.getvalue()
     return _inflated(content) if random.random() < 0.01 else content
+
+
+def _entry(name: str, method: int) -> zipfile.ZipInfo:
+    """An entry with a fixed date, so that the same random state gives the same bytes."""
+    entry = zipfile.ZipInfo(name)
+    entry.compress_type = method
+    return entry
 
 
 def _inflated(archive: bytes) -> bytes:
